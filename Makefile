@@ -1,0 +1,55 @@
+# The commands that people and CI type; "make" lists them. CMake does the building (CMakePresets.json).
+#
+# JOBS    parallel compilers and tests; all cores
+# PRESET  what build, demo and test use. "ci" stops on warnings, and knows those of g++ 12; with
+#         another compiler: make demo PRESET=release. Both build in build/release.
+JOBS ?= $(shell nproc)
+PRESET ?= ci
+CTEST = ctest --output-on-failure --no-tests=error -j$(JOBS)
+# Tracked files and new ones that are not ignored.
+OUR_SOURCES = git ls-files -z --cached --others --exclude-standard '*.h' '*.cc' '*.c'
+
+.DEFAULT_GOAL := help
+.PHONY: help setup demo build test bench format format-check tidy asan tsan clean
+
+help:  ## This list
+	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 16
+
+setup:  ## Install the Debian packages that are missing (packages.txt)
+	@tools/setup
+
+demo: build  ## The whole loop on a simulated rig
+	@samples/demo.sh
+
+build: setup  ## Build everything into build/release
+	@cmake --preset $(PRESET) --log-level=WARNING
+	@cmake --build --preset $(PRESET) -j$(JOBS)
+
+test: build  ## Build and run all tests
+	@$(CTEST) --test-dir build/release
+
+bench: build  ## Run the micro-benchmarks
+	@for program in build/release/bin/*_bench; do echo "== $$program"; $$program || exit 1; done
+
+format: setup  ## Format all sources in place
+	@$(OUR_SOURCES) | xargs -0r clang-format -i
+
+format-check: setup  ## Fail where a source is not formatted
+	@$(OUR_SOURCES) | xargs -0r clang-format --dry-run -Werror
+
+tidy: setup  ## clang-tidy over all sources that build/release compiles
+	@cmake --preset $(PRESET) --log-level=WARNING
+	@tools/tidy build/release $(JOBS)
+
+asan: setup  ## All tests under the address and undefined-behaviour sanitizers
+	@cmake --preset asan --log-level=WARNING
+	@cmake --build --preset asan -j$(JOBS)
+	@UBSAN_OPTIONS=print_stacktrace=1 $(CTEST) --test-dir build/asan
+
+tsan: setup  ## All tests under the thread sanitizer
+	@cmake --preset tsan --log-level=WARNING
+	@cmake --build --preset tsan -j$(JOBS)
+	@TSAN_OPTIONS="suppressions=$(CURDIR)/tests/tsan.supp" $(CTEST) --test-dir build/tsan
+
+clean:  ## Remove build/
+	@rm -rf build

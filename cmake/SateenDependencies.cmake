@@ -1,0 +1,42 @@
+# Every package that Sateen's libraries use, in one place. Read by the build, where a missing package
+# stops the configuration, and by sateen-config.cmake, where it makes find_package(sateen) fail.
+include(CMakeFindDependencyMacro)
+
+# A macro, because find_dependency() returns from this file when the package is missing.
+macro(sateen_find_package)
+  if("${CMAKE_FIND_PACKAGE_NAME}" STREQUAL "sateen")
+    find_dependency(${ARGV})
+  else()
+    find_package(${ARGV} REQUIRED)
+  endif()
+endmacro()
+
+# sateen_find_pkg_config(<prefix> <module>): the target PkgConfig::<prefix>.
+macro(sateen_find_pkg_config prefix module)
+  if("${CMAKE_FIND_PACKAGE_NAME}" STREQUAL "sateen")
+    pkg_check_modules(${prefix} QUIET IMPORTED_TARGET "${module}")
+    if(NOT ${prefix}_FOUND)
+      set(sateen_FOUND FALSE)
+      set(sateen_NOT_FOUND_MESSAGE "sateen needs '${module}', which pkg-config does not find.")
+      return()
+    endif()
+  else()
+    pkg_check_modules(${prefix} REQUIRED IMPORTED_TARGET "${module}")
+  endif()
+endmacro()
+
+sateen_find_package(Eigen3 3.4 NO_MODULE)
+sateen_find_package(fmt 9)
+sateen_find_package(tl-expected 1.0)
+sateen_find_package(TBB 2021)
+sateen_find_package(hwy 1.0.3)
+sateen_find_package(OpenSSL 3 COMPONENTS Crypto)
+sateen_find_package(nlohmann_json 3.11)
+sateen_find_package(PkgConfig)
+sateen_find_pkg_config(LibRaw libraw_r)
+sateen_find_pkg_config(matio matio)
+# Not by its CMake package: Debian's stops unless the image viewer, and with it Qt, is installed.
+sateen_find_pkg_config(OpenImageIO OpenImageIO>=2.4)
+if(NOT TARGET OpenImageIO::OpenImageIO)
+  add_library(OpenImageIO::OpenImageIO ALIAS PkgConfig::OpenImageIO)
+endif()

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <string_view>
+
+#include "core/error.h"
+
+namespace sateen {
+
+// Hands the file's bytes to `use`, piece by piece. kIo where it is absent, a folder or unreadable.
+[[nodiscard]] Status ReadPieces(const std::filesystem::path& path,
+                                const std::function<void(std::string_view)>& use);
+
+// The file's bytes. kIo where it is absent, a folder or unreadable.
+[[nodiscard]] Result<std::string> ReadFileBytes(const std::filesystem::path& path);
+
+// Creates or empties `path` and writes `bytes`. Errors speak of `shown`, the name that the user
+// knows. To replace a file that counts, use core/output_folder.h.
+[[nodiscard]] Status WriteBytes(const std::filesystem::path& path, const std::string& bytes,
+                                const std::filesystem::path& shown);
+
+// Makes what was written to a file or folder survive a loss of power.
+[[nodiscard]] Status FlushToDisk(const std::filesystem::path& path,
+                                 const std::filesystem::path& shown);
+
+// The system's words for an errno.
+[[nodiscard]] std::string SystemReason(int error_number);
+
+}  // namespace sateen

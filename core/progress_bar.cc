@@ -1,0 +1,63 @@
+#include "core/progress_bar.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdint>
+
+namespace sateen {
+namespace {
+
+constexpr std::chrono::milliseconds kMinInterval{100};
+constexpr int kBarWidth = 30;
+constexpr size_t kNameWidth = 24;
+constexpr int kLineWidth = 63;  // name, bar and percentage; fits any terminal
+
+// A terminal that is gone is no reason to stop the work.
+void Write(int fd, const std::string& text) {
+  [[maybe_unused]] const ssize_t ignored = write(fd, text.data(), text.size());
+}
+
+}  // namespace
+
+ProgressBar::ProgressBar(int fd) : fd_(fd), on_terminal_(isatty(fd) == 1) {}
+
+ProgressBar::~ProgressBar() {
+  if (on_terminal_ && !stage_.empty()) {
+    Write(fd_, fmt::format("\r{:{}}\r", "", kLineWidth));
+  }
+}
+
+void ProgressBar::BeginStage(std::string_view name, int total) {
+  if (!on_terminal_) {
+    return;
+  }
+  const std::lock_guard lock(mutex_);
+  stage_ = name;
+  total_ = total;
+  done_ = 0;
+  Draw();
+}
+
+void ProgressBar::Advance(int steps) {
+  if (!on_terminal_) {
+    return;
+  }
+  const std::lock_guard lock(mutex_);
+  done_ += steps;
+  if (std::chrono::steady_clock::now() - drawn_at_ >= kMinInterval) {
+    Draw();
+  }
+}
+
+void ProgressBar::Draw() {
+  const int64_t total = std::max(1, total_);
+  const int64_t done = std::clamp<int64_t>(done_, 0, total);
+  const std::string filled(static_cast<size_t>(kBarWidth * done / total), '#');
+  Write(fd_, fmt::format("\r{:{}.{}} [{:{}}] {:3} %", stage_, kNameWidth, kNameWidth, filled,
+                         kBarWidth, 100 * done / total));
+  drawn_at_ = std::chrono::steady_clock::now();
+}
+
+}  // namespace sateen

@@ -1,0 +1,24 @@
+#pragma once
+
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "core/error.h"
+#include "imaging/image.h"
+
+namespace sateen {
+
+// One lit frame as linear radiance: dark-subtracted, exposure-normalised, 1 = what a perfect white
+// diffuser shows that faces a light of irradiance 1.
+struct LightFrame {
+  Image3 rgb;
+  // Radiance of the file's full scale (what saturates); infinite where nothing saturates.
+  float full_scale = std::numeric_limits<float>::infinity();
+  std::string name;  // for messages: the file it came from
+};
+
+// The frames of a session, one for each light, in the order of the lights.
+using LightStack = std::vector<LightFrame>;
+
+}  // namespace sateen

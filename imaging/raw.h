@@ -1,0 +1,42 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "core/error.h"
+#include "imaging/image.h"
+
+namespace sateen {
+
+// A camera RAW file as the sensor saw it: one colour a site, linear, black subtracted,
+// 1 = white level. Values below black stay negative.
+struct RawMosaic {
+  Image<float> samples;             // the visible area
+  std::array<uint8_t, 4> cfa = {};  // colour (0 red, 1 green, 2 blue) of sites (0,0) (1,0) (0,1) (1,1)
+  float black = 0.0F;               // [DN], mean over the four sites
+  float white = 0.0F;               // [DN]
+  std::array<float, 3> camera_white_balance = {1.0F, 1.0F, 1.0F};  // as shot; green = 1; unused here
+  std::string camera;               // make and model
+  std::optional<double> exposure_s;
+  std::optional<double> f_number;
+  std::optional<double> iso;
+};
+
+// True for the file name endings of camera RAW files.
+[[nodiscard]] bool IsRawName(const std::filesystem::path& path);
+
+/// Decodes a camera RAW file (through LibRaw): no auto brightness, no white balance, no
+/// colour matrix; black and white level applied.
+///
+/// Errors   kIo: the file is absent or unreadable
+///          kBadData: not a RAW file that can be decoded, cut short, or its CFA is not 2x2 Bayer
+[[nodiscard]] Result<RawMosaic> ReadRawMosaic(const std::filesystem::path& path);
+
+// Camera RGB at every pixel. Bilinear: the mean of the nearest sites of each colour; measured
+// values are kept as they are at their own sites.
+[[nodiscard]] Image3 Demosaic(const RawMosaic& mosaic);
+
+}  // namespace sateen

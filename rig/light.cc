@@ -1,0 +1,71 @@
+#include "rig/light.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace sateen {
+namespace {
+
+constexpr double kUnitTolerance = 1e-3;  // files often round unit vectors to four digits
+constexpr double kReferenceDistanceMm = 1000.0;
+
+bool IsUnit(const Eigen::Vector3d& v) { return std::abs(v.norm() - 1.0) <= kUnitTolerance; }
+
+std::string Show(const Eigen::Vector3d& v) {
+  return fmt::format("[{:.6g}, {:.6g}, {:.6g}]", v.x(), v.y(), v.z());
+}
+
+}  // namespace
+
+std::string_view Name(LightModel model) {
+  switch (model) {
+    case LightModel::kDistant:
+      return "distant";
+    case LightModel::kNear:
+      return "near";
+    case LightModel::kLed:
+      return "led";
+  }
+  return "";
+}
+
+Status Light::Validate(std::string_view what) const {
+  if (model == LightModel::kDistant && !IsUnit(direction)) {
+    return Fail(ErrorCode::kBadData, "{}: direction {} has length {:.6g}; need a unit vector", what,
+                Show(direction), direction.norm());
+  }
+  if (model != LightModel::kDistant && !(position_mm.allFinite() && position_mm.z() > 0.0)) {
+    return Fail(ErrorCode::kBadData,
+                "{}: position_mm {}; need finite numbers and z > 0 (the table)", what,
+                Show(position_mm));
+  }
+  if (model == LightModel::kLed && !IsUnit(axis)) {
+    return Fail(ErrorCode::kBadData, "{}: axis {} has length {:.6g}; need a unit vector", what,
+                Show(axis), axis.norm());
+  }
+  if (model == LightModel::kLed && !(anisotropy >= 0.0 && anisotropy <= 100.0)) {
+    return Fail(ErrorCode::kBadData, "{}: anisotropy {:.6g}; need 0 to 100", what, anisotropy);
+  }
+  if (!(flux_rgb.allFinite() && flux_rgb.minCoeff() > 0.0)) {
+    return Fail(ErrorCode::kBadData, "{}: intensity {}; need three finite numbers > 0", what,
+                Show(flux_rgb));
+  }
+  return {};
+}
+
+Incident IncidentAt(const Light& light, const Eigen::Vector3d& x_mm) {
+  if (light.model == LightModel::kDistant) {
+    return {light.direction, light.flux_rgb};  // (1)
+  }
+  const Eigen::Vector3d d = light.position_mm - x_mm;
+  const double distance_mm = d.norm();
+  const double falloff = kReferenceDistanceMm / distance_mm;
+  Incident incident{d / distance_mm, light.flux_rgb * (falloff * falloff)};  // (2)
+  if (light.model == LightModel::kLed) {
+    const double cosine = std::max(0.0, -incident.l.dot(light.axis));
+    incident.e_rgb *= std::pow(cosine, light.anisotropy);  // (3)
+  }
+  return incident;
+}
+
+}  // namespace sateen

@@ -1,0 +1,54 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/error.h"
+
+namespace sateen {
+
+// The rungs of the model ladder (docs/concepts.md); each adds to the one above.
+enum class LightModel { kDistant, kNear, kLed };
+
+[[nodiscard]] std::string_view Name(LightModel model);
+
+// One LED as a plain value, in the table frame. Which fields count depends on `model`.
+struct Light {
+  std::string name;
+  int channel = 0;  // of the LED board
+  LightModel model = LightModel::kDistant;
+  // kDistant: unit vector from the table towards the light.
+  Eigen::Vector3d direction = Eigen::Vector3d::UnitZ();
+  // kNear, kLed: where the light is.
+  Eigen::Vector3d position_mm = Eigen::Vector3d::Zero();
+  // kLed: unit vector along which it shines, and the exponent mu >= 0 of its angular fall-off.
+  Eigen::Vector3d axis = -Eigen::Vector3d::UnitZ();
+  double anisotropy = 0.0;
+  // kDistant: irradiance; otherwise the irradiance at 1 m on the axis. Red, green, blue; > 0.
+  Eigen::Vector3d flux_rgb = Eigen::Vector3d::Ones();
+
+  // Names the first field that is out of range, with its value and its range. `what` names the
+  // light in the message ("lights.txt: light 3").
+  [[nodiscard]] Status Validate(std::string_view what) const;
+};
+
+using Lights = std::vector<Light>;
+
+// What one light does at one point.
+struct Incident {
+  Eigen::Vector3d l;      // unit vector towards the light
+  Eigen::Vector3d e_rgb;  // irradiance on a surface that faces the light
+};
+
+/// The light that arrives at point x of the table frame, in millimetres:
+///
+///     distant   l constant,                e = phi                                        (1)
+///     near      d = s - x, l = d / |d|,    e = phi (1000 mm / |d|)^2                      (2)
+///     led       as near, and               e = (2) * max(0, -l . a)^mu                    (3)
+///
+/// s = position_mm, a = axis, mu = anisotropy, phi = flux_rgb. x must not be s.
+[[nodiscard]] Incident IncidentAt(const Light& light, const Eigen::Vector3d& x_mm);
+
+}  // namespace sateen

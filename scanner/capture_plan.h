@@ -1,0 +1,38 @@
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "rig/rig.h"
+#include "scanner/session.h"
+#include "scanner/truth.h"
+
+namespace sateen {
+
+// One exposure to be read.
+struct FrameFile {
+  std::filesystem::path path;
+  // The file's value divided by this is radiance: exposure_s (iso / 100) / f_number^2.
+  double exposure = 1.0;
+  std::optional<std::string> sha256;  // what the session recorded
+};
+
+// What a layout says about a capture, before any pixel is read.
+struct CapturePlan {
+  std::string layout;
+  Rig rig;
+  // One for each light of the rig, in its order; nothing where the session has no frame of it.
+  std::vector<std::optional<FrameFile>> lit;
+  std::vector<FrameFile> dark;
+  std::optional<std::filesystem::path> mask;
+  bool mask_is_shared = false;  // it lies one folder up: left out where its size does not fit
+  std::optional<TruthFiles> truth;
+  std::optional<Session> session;
+  std::vector<std::string> warnings;
+  std::map<std::string, std::string> sha256_of_input;  // path as read -> hash
+};
+
+}  // namespace sateen

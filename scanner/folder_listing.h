@@ -1,0 +1,39 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/error.h"
+
+namespace sateen {
+
+// Numbers inside names compare by value: cat.2 before cat.10. A total order.
+[[nodiscard]] bool NaturalLess(std::string_view a, std::string_view b);
+
+// Names of the files in `dir` (no folders, none that begin with a dot), in natural order.
+[[nodiscard]] Result<std::vector<std::string>> FilesInNaturalOrder(
+    const std::filesystem::path& dir);
+
+// mask.png, cat.mask.tga, cat_mask.png: photographs by their ending, masks by their name.
+[[nodiscard]] bool IsMaskName(std::string_view name);
+
+// The one mask in `dir`; kBadData where several could be meant.
+[[nodiscard]] Result<std::optional<std::filesystem::path>> FindMask(
+    const std::filesystem::path& dir);
+
+// The first mask.* in `dir`, a folder that need not be ours: nothing where it cannot be listed.
+[[nodiscard]] std::optional<std::filesystem::path> FindSharedMask(const std::filesystem::path& dir);
+
+// What a person finds in the folder, for messages: "12 files (10 .png, 2 .txt), 1 folder".
+[[nodiscard]] std::string DescribeFolder(const std::filesystem::path& dir);
+
+// False also where the path cannot be looked at; reading it will then say why.
+[[nodiscard]] bool Exists(const std::filesystem::path& path);
+
+// ASCII only: the file name endings and words that we look for.
+[[nodiscard]] std::string LowerCase(std::string_view text);
+
+}  // namespace sateen

@@ -1,0 +1,72 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/error.h"
+
+namespace sateen {
+
+enum class SessionKind { kFabric, kSheet, kChart, kBoard };
+enum class FrameRole { kLit, kDark };
+
+[[nodiscard]] std::string_view Name(SessionKind kind);
+[[nodiscard]] std::string_view Name(FrameRole role);
+
+// One exposure of a session.
+struct SessionFrame {
+  FrameRole role = FrameRole::kLit;
+  std::string light;  // name of the rig's light; empty for a dark frame
+  std::string file;   // relative to the session's folder
+  std::optional<std::string> sha256;
+  // As far as they are known; a factor is known for every frame or for none.
+  std::optional<double> exposure_s;
+  std::optional<double> f_number;
+  std::optional<double> iso;
+
+  /// The value of a file divided by H is radiance:
+  ///
+  ///     H = exposure_s (iso / 100) / f_number^2,        a factor that is not known is 1     (1)
+  [[nodiscard]] double Exposure() const;
+};
+
+/// One capture on disk: its frames and their record, session.json. A plain value.
+///
+///     {"schema": "sateen.session/1",
+///      "kind": "fabric",                    fabric, sheet, chart or board
+///      "rig": "../rig.json",                relative to the session's folder
+///      "rig_sha256": "9f86...",             optional: 64 lower-case hexadecimal digits
+///      "frames": [
+///        {"role": "lit",                    lit or dark
+///         "light": "led-0",                 name of the rig's light; lit frames only
+///         "file": "frames/led-0.exr",       relative to the session's folder
+///         "sha256": "60303...",             optional
+///         "exposure_s": 0.0125,             optional, > 0; for every frame or for none
+///         "f_number": 8,                    optional, likewise
+///         "iso": 100}],                     optional, likewise
+///      "table_from_sheet": [16 numbers],    optional: rigid, row-major, millimetres
+///      "mask": "mask.png"}                  optional: relative to the session's folder
+struct Session {
+  SessionKind kind = SessionKind::kFabric;
+  std::string rig;
+  std::optional<std::string> rig_sha256;
+  std::vector<SessionFrame> frames;
+  std::optional<Eigen::Isometry3d> table_from_sheet;
+  std::optional<std::string> mask;
+};
+
+/// Reads session.json in `dir`.
+///
+/// Errors   kIo: absent or unreadable
+///          kBadData: another schema, a key missing, unknown or out of range; only journal.jsonl
+///          is there, so the capture was not completed
+[[nodiscard]] Result<Session> ReadSession(const std::filesystem::path& dir);
+
+// The text of session.json; ReadSession gives the same value back.
+[[nodiscard]] std::string SessionToJson(const Session& session);
+
+}  // namespace sateen

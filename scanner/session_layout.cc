@@ -1,0 +1,101 @@
+#include "scanner/session_layout.h"
+
+#include <algorithm>
+
+#include "core/sha256.h"
+
+namespace sateen {
+namespace {
+
+namespace fs = std::filesystem;
+
+Status ReadRigInto(const fs::path& path, const std::optional<std::string>& recorded_sha256,
+                   CapturePlan& plan) {
+  const Result<std::string> hash = Sha256OfFile(path);
+  if (!hash) {
+    return tl::unexpected(hash.error());
+  }
+  if (recorded_sha256 && *recorded_sha256 != *hash) {
+    return Fail(ErrorCode::kBadData,
+                "{}: its SHA-256 is {} but the session recorded {}: the rig has changed since the "
+                "capture; restore it, or give the one to use with --rig",
+                path.string(), *hash, *recorded_sha256);
+  }
+  Result<Rig> rig = ReadRig(path);
+  if (!rig) {
+    return tl::unexpected(rig.error());
+  }
+  plan.sha256_of_input[path.string()] = *hash;
+  plan.rig = *std::move(rig);
+  return {};
+}
+
+std::string NamesOf(const Lights& lights) {
+  std::string names;
+  for (const Light& light : lights) {
+    names += (names.empty() ? "" : ", ") + light.name;
+  }
+  return names;
+}
+
+// Puts each frame at the place of its light.
+Status AssignFrames(const fs::path& dir, CapturePlan& plan) {
+  const std::string where = (dir / "session.json").string();
+  plan.lit.resize(plan.rig.lights.size());
+  for (const SessionFrame& frame : plan.session->frames) {
+    FrameFile file{dir / frame.file, frame.Exposure(), frame.sha256};
+    if (frame.role == FrameRole::kDark) {
+      plan.dark.push_back(std::move(file));
+      continue;
+    }
+    const Lights& lights = plan.rig.lights;
+    const auto light = std::find_if(lights.begin(), lights.end(),
+                                    [&](const Light& l) { return l.name == frame.light; });
+    if (light == lights.end()) {
+      return Fail(ErrorCode::kBadData,
+                  "{}: frame {} is of light '{}', which the rig has not; its lights are {}", where,
+                  frame.file, frame.light, NamesOf(lights));
+    }
+    std::optional<FrameFile>& slot = plan.lit[static_cast<size_t>(light - lights.begin())];
+    if (slot) {
+      return Fail(ErrorCode::kBadData,
+                  "{}: frames {} and {} are both of light '{}'; need one frame for each light",
+                  where, slot->path.lexically_relative(dir).string(), frame.file, frame.light);
+    }
+    slot = std::move(file);
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<CapturePlan> PlanSession(const fs::path& dir, const ReadCaptureOptions& options) {
+  CapturePlan plan;
+  plan.layout = "session";
+  const Result<Session> session = ReadSession(dir);
+  if (!session) {
+    return tl::unexpected(session.error());
+  }
+  plan.session = *session;
+  const fs::path path = dir / "session.json";
+  const Result<std::string> hash = Sha256OfFile(path);
+  if (!hash) {
+    return tl::unexpected(hash.error());
+  }
+  plan.sha256_of_input[path.string()] = *hash;
+  const Status rig = options.rig_file ? ReadRigInto(*options.rig_file, std::nullopt, plan)
+                                      : ReadRigInto(dir / session->rig, session->rig_sha256, plan);
+  if (!rig) {
+    return tl::unexpected(rig.error());
+  }
+  if (const Status status = AssignFrames(dir, plan); !status) {
+    return tl::unexpected(status.error());
+  }
+  if (session->mask) {
+    plan.mask = dir / *session->mask;
+  }
+  plan.truth = FindSessionTruth(dir);
+  return plan;
+}
+
+}  // namespace sateen

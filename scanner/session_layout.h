@@ -1,0 +1,16 @@
+#pragma once
+
+#include <filesystem>
+
+#include "core/error.h"
+#include "scanner/capture_plan.h"
+#include "scanner/stack_reader.h"
+
+namespace sateen {
+
+// A folder with session.json. The rig is options.rig_file, else the one that the session names;
+// frames are matched to its lights by name.
+[[nodiscard]] Result<CapturePlan> PlanSession(const std::filesystem::path& dir,
+                                              const ReadCaptureOptions& options);
+
+}  // namespace sateen

@@ -1,0 +1,52 @@
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/error.h"
+#include "core/task.h"
+#include "imaging/image_io.h"
+#include "imaging/light_stack.h"
+#include "rig/rig.h"
+#include "scanner/session.h"
+#include "scanner/truth.h"
+
+namespace sateen {
+
+// A capture of any layout, read into values: what the solver needs, and where it came from.
+struct Capture {
+  std::string layout;        // "session", "diligent", "lp", "lights.txt"
+  LightStack stack;          // K frames, all of one size
+  Rig rig;                   // K lights in the order of the frames; camera where known
+  std::optional<Mask> mask;  // the part of the image that counts; at least one pixel
+  std::optional<Truth> truth;
+  std::optional<Session> session;  // the whole record, also of lights that were not asked for
+  std::vector<std::string> warnings;
+  std::map<std::string, std::string> sha256_of_input;  // path as read -> hash
+};
+
+struct ReadCaptureOptions {
+  // Use only these lights, in this order, by their index from 0 in the capture; empty: all.
+  std::vector<int> lights;
+  // Use these instead of what the capture names. The rig has one light for each of the capture's,
+  // in the same order; those of a session are matched by name.
+  std::optional<std::filesystem::path> rig_file;
+  std::optional<std::filesystem::path> mask_file;
+  Encoding encoding = Encoding::kAuto;
+};
+
+/// Reads a capture as it is: a folder with session.json (docs/formats.md), a DiLiGenT folder, an
+/// RTI .lp file, or a folder of images with a lights.txt in it or one folder up. Where a folder
+/// could be several of these, the first counts.
+///
+/// Errors   kInvalidArgument: a light that `options` asks for does not exist, or is asked for twice
+///          kIo: a file is absent or unreadable
+///          kBadData: wrong counts, sizes or formats, a light of zero length, a hash that differs
+///          kCancelled
+[[nodiscard]] Result<Capture> ReadCapture(const std::filesystem::path& path,
+                                          const ReadCaptureOptions& options, const Task& task = {});
+
+}  // namespace sateen

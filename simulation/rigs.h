@@ -1,0 +1,19 @@
+#pragma once
+
+#include "rig/rig.h"
+
+namespace sateen {
+
+// `count` equal distant lights on a cone `polar_rad` from the zenith.
+[[nodiscard]] Lights DistantRing(int count, double polar_rad);
+
+// `count` equal LEDs on a circle of a hemisphere of `radius_mm`, `polar_rad` from the zenith, each
+// aimed at the table's origin; flux 1 gives irradiance 1 at 1 m.
+[[nodiscard]] Lights LedRing(LightModel model, int count, double polar_rad, double radius_mm);
+
+// The seed's scanner: ten LEDs on a hemisphere of 600 mm, camera 610 mm above the table that sees
+// `width_mm` of it. flux_rgb is such that irradiance at the origin is 1.
+[[nodiscard]] Rig RingRig(ImageSize size_px, LightModel model = LightModel::kNear,
+                          double width_mm = 200.0);
+
+}  // namespace sateen

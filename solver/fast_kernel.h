@@ -1,0 +1,72 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <string_view>
+#include <vector>
+
+#include "rig/light.h"
+
+namespace sateen {
+
+// One light as the kernel wants it.
+struct KernelLight {
+  LightModel model = LightModel::kDistant;
+  std::array<float, 3> place = {};  // distant: l; otherwise position_mm
+  std::array<float, 3> axis = {};
+  float anisotropy = 0.0F;
+  std::array<float, 3> inverse_flux = {};  // distant: 1 / phi; otherwise 1 / (phi 1e6 mm^2)
+  float clip = 0.0F;                       // radiance at or above is saturated
+  float dark = 0.0F;                       // radiance above is not dark
+};
+
+struct KernelParams {
+  std::vector<KernelLight> lights;
+  float shadow_level = 0.0F;
+  // Refuse where the bound on the condition number of L^T L is above this.
+  float max_condition_squared = 0.0F;
+};
+
+// `count` consecutive pixels. Planes are 3 K pointers to the first of them, r g b of light 0 first.
+struct KernelInput {
+  const float* const* planes = nullptr;
+  const float* x_mm = nullptr;  // table positions; null when every light is distant
+  const float* y_mm = nullptr;
+  const uint8_t* mask = nullptr;  // 0 outside; null: all inside
+  size_t count = 0;
+};
+
+struct KernelOutput {
+  std::array<float*, 3> normal = {};
+  std::array<float*, 3> albedo = {};
+  float* residual = nullptr;
+  uint8_t* samples = nullptr;
+  uint8_t* reason = nullptr;
+};
+
+// Condition number squared up to which float holds equation (3): the bound at which the measured
+// albedo error of noiseless scenes reaches 1e-5 (tests/solver/stability_test.cc).
+inline constexpr float kFloatConditionSquared = 400.0F;
+
+/// Equations (1) to (4) of solver/lambertian.h in float, one pixel a lane.
+///
+/// L^T L is inverted by its adjugate; N gets one step of refinement from the residuals of (3), so
+/// its error grows with the condition number of L and not with its square. Pixels whose bound
+///
+///     cond(L^T L) <= trace(L^T L) * (sum of principal 2x2 minors) / det
+///
+/// exceeds max_condition_squared are refused: kIllConditioned. Radiance from the smallest float to
+/// 1e30 gives the same answer times its scale: pixels far from 1 are brought there by a power of
+/// two first, subnormal numbers by integer arithmetic, because floating-point assists for them
+/// cost a hundred times the solve.
+void SolveSpan(const KernelParams& params, const KernelInput& input, const KernelOutput& output);
+
+// Sums the same planes and writes the same outputs, nothing else: the memory bandwidth that the
+// access pattern of SolveSpan allows.
+void TouchSpan(const KernelParams& params, const KernelInput& input, const KernelOutput& output);
+
+// What SolveSpan was compiled for on this machine: "AVX3", "AVX2", "SSE4", ...
+[[nodiscard]] std::string_view KernelInstructionSet();
+
+}  // namespace sateen

@@ -1,0 +1,52 @@
+#pragma once
+
+#include <optional>
+
+#include "core/error.h"
+#include "core/task.h"
+#include "rig/table_grid.h"
+#include "solver/fast_kernel.h"
+#include "solver/lambertian.h"
+
+namespace sateen {
+
+// Feeds rows of a stack to the kernel. Borrows the stack and the mask, which must have been checked
+// (SolveLambertian does).
+class FastRows {
+ public:
+  // kBadData where a near light needs table positions and a pixel does not see the table.
+  [[nodiscard]] static Result<FastRows> Make(const LightStack& stack, const Rig& rig,
+                                             const std::optional<Mask>& mask,
+                                             const LambertianOptions& options);
+
+  // Solves rows [begin, end) into `field`; refused pixels are kIllConditioned.
+  void Solve(int begin, int end, NormalField& field) const { Run(SolveSpan, begin, end, field); }
+  // Moves the same bytes and computes nothing: the floor of Solve.
+  void Touch(int begin, int end, NormalField& field) const { Run(TouchSpan, begin, end, field); }
+
+ private:
+  using SpanFunction = void (*)(const KernelParams&, const KernelInput&, const KernelOutput&);
+
+  FastRows(const LightStack& stack, const std::optional<Mask>& mask)
+      : stack_(&stack), mask_(&mask) {}
+  void Run(SpanFunction function, int begin, int end, NormalField& field) const;
+
+  const LightStack* stack_;
+  const std::optional<Mask>* mask_;
+  std::optional<TableGrid> grid_;  // absent where all lights are distant
+  KernelParams params_;
+};
+
+// Rows that one thread takes at a time: about 8,000 pixels, so that positions stay in its cache.
+[[nodiscard]] int RowsPerPiece(ImageSize size);
+
+[[nodiscard]] bool AllDistant(const Lights& lights);
+
+// Runs Touch over a whole image: what SolveLambertian would take if memory were the only cost.
+[[nodiscard]] Status TouchAllRows(const FastRows& rows, ImageSize size, const Task& task,
+                                  NormalField& field);
+
+// Bytes that Solve and Touch read and write for each pixel.
+[[nodiscard]] size_t BytesPerPixel(size_t light_count);
+
+}  // namespace sateen

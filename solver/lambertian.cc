@@ -1,0 +1,254 @@
+#include "solver/lambertian.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <numeric>
+#include <utility>
+#include <vector>
+
+#include "core/parallel.h"
+#include "solver/fast_kernel.h"
+#include "solver/fast_rows.h"
+#include "solver/reference_backends.h"
+
+namespace sateen {
+namespace {
+
+constexpr size_t kMinLights = 3;
+constexpr float kSmallestFullScale = 1e-30F;  // thresholds below it would be subnormal
+
+constexpr std::array<std::pair<Backend, std::string_view>, 5> kBackendNames = {{
+    {Backend::kJacobiSvd, "jacobi-svd"},
+    {Backend::kQr, "qr"},
+    {Backend::kLdlt, "ldlt"},
+    {Backend::kFast, "fast"},
+    {Backend::kAuto, "auto"},
+}};
+
+Status CheckStack(const LightStack& stack, const std::optional<Mask>& mask) {
+  const ImageSize size = stack[0].rgb.Size();
+  if (size.PixelCount() == 0) {
+    return Fail(ErrorCode::kBadData, "{}: the image is empty ({}x{} px)", stack[0].name, size.width,
+                size.height);
+  }
+  for (const LightFrame& frame : stack) {
+    for (const Image<float>& plane : frame.rgb.planes) {
+      if (plane.Size() != size) {
+        return Fail(ErrorCode::kBadData, "{}: {}x{} px, but {} is {}x{} px; need one size",
+                    frame.name, plane.width, plane.height, stack[0].name, size.width, size.height);
+      }
+    }
+    if (!(frame.full_scale >= kSmallestFullScale)) {
+      return Fail(ErrorCode::kBadData, "{}: full scale {:g}; need at least {:g}", frame.name,
+                  frame.full_scale, kSmallestFullScale);
+    }
+  }
+  if (mask && mask->Size() != size) {
+    return Fail(ErrorCode::kBadData, "the mask is {}x{} px but the frames are {}x{} px",
+                mask->width, mask->height, size.width, size.height);
+  }
+  return {};
+}
+
+// The condition number of the lights' directions; only for lights that are all distant.
+Status CheckDirections(const Lights& lights, double max_condition) {
+  Eigen::MatrixX3d directions(static_cast<Eigen::Index>(lights.size()), 3);
+  for (size_t k = 0; k < lights.size(); ++k) {
+    directions.row(static_cast<Eigen::Index>(k)) = lights[k].direction.transpose();
+  }
+  const Eigen::Vector3d sigma = directions.jacobiSvd().singularValues();
+  if (!(sigma[0] <= max_condition * sigma[2])) {
+    return Fail(ErrorCode::kDegenerate,
+                "all {} lights lie in or near one plane (condition number {:.3g}, need at most "
+                "{:.3g}); add a light out of it",
+                lights.size(), sigma[0] / sigma[2], max_condition);
+  }
+  return {};
+}
+
+Status CheckInputs(const LightStack& stack, const Rig& rig, const std::optional<Mask>& mask,
+                   const LambertianOptions& options) {
+  if (stack.size() != rig.lights.size()) {
+    return Fail(ErrorCode::kBadData, "{} frames but {} lights; need one light a frame",
+                stack.size(), rig.lights.size());
+  }
+  if (stack.size() < kMinLights) {
+    return Fail(ErrorCode::kDegenerate, "{} lights; need at least {} to solve for a normal",
+                stack.size(), kMinLights);
+  }
+  if (Status status = CheckStack(stack, mask); !status) {
+    return status;
+  }
+  if (Status status = rig.Validate("rig"); !status) {
+    return status;
+  }
+  if (AllDistant(rig.lights)) {
+    return CheckDirections(rig.lights, options.max_condition);
+  }
+  if (!rig.camera) {
+    return Fail(ErrorCode::kBadData,
+                "the rig has no camera, but near lights need one to place pixels on the table");
+  }
+  const ImageSize size = stack[0].rgb.Size();
+  if (rig.camera->size_px != size) {
+    return Fail(ErrorCode::kBadData, "the rig's camera has {}x{} px but the frames are {}x{} px",
+                rig.camera->size_px.width, rig.camera->size_px.height, size.width, size.height);
+  }
+  return {};
+}
+
+// Marks the pixels that the double backends are to solve; the fast ones leave it where they refuse.
+constexpr Reason kPending = Reason::kIllConditioned;
+
+void CountReasons(const Image<uint8_t>& reason, SolveSummary& summary) {
+  std::array<int64_t, 256> histogram = {};
+  for (const uint8_t code : reason.pixels) {
+    ++histogram[code];
+  }
+  const auto count = [&](Reason which) { return histogram[static_cast<uint8_t>(which)]; };
+  summary.solved = count(Reason::kSolved);
+  summary.dark = count(Reason::kDark);
+  summary.too_few_samples = count(Reason::kTooFewSamples);
+  summary.saturated = count(Reason::kSaturated);
+  summary.ill_conditioned = count(Reason::kIllConditioned);
+  summary.pixels = static_cast<int64_t>(reason.pixels.size()) - count(Reason::kOutsideMask);
+}
+
+// Every pixel as unsolved; those inside the mask wait for the double backends.
+void ClearRows(const std::optional<Mask>& mask, int row_begin, int row_end, NormalField& field) {
+  const size_t begin = field.reason.Index(0, row_begin);
+  const size_t end = field.reason.Index(0, row_end);
+  for (size_t p = begin; p < end; ++p) {
+    for (size_t c = 0; c < 3; ++c) {
+      field.normal[c].pixels[p] = 0.0F;
+      field.albedo[c].pixels[p] = 0.0F;
+    }
+    field.residual.pixels[p] = 0.0F;
+    field.samples.pixels[p] = 0;
+    const bool inside = !mask || mask->pixels[p] != 0;
+    field.reason.pixels[p] = static_cast<uint8_t>(inside ? kPending : Reason::kOutsideMask);
+  }
+}
+
+int64_t CountPending(int row_begin, int row_end, const NormalField& field) {
+  const uint8_t* pixels = field.reason.pixels.data();
+  return std::count(pixels + field.reason.Index(0, row_begin),
+                    pixels + field.reason.Index(0, row_end), static_cast<uint8_t>(kPending));
+}
+
+Status SolveAllRows(const LightStack& stack, const Rig& rig, const std::optional<Mask>& mask,
+                    const LambertianOptions& options, const FastRows& fast_rows, const Task& task,
+                    NormalField& field) {
+  const ImageSize size = stack[0].rgb.Size();
+  const bool fast = options.backend == Backend::kFast || options.backend == Backend::kAuto;
+  std::vector<int64_t> refused(static_cast<size_t>(size.height), 0);
+  task.BeginStage("solving", size.height);
+  const Status status = ParallelFor(size.height, RowsPerPiece(size), task, [&](int begin, int end) {
+    if (fast) {
+      fast_rows.Solve(begin, end, field);
+      refused[static_cast<size_t>(begin)] = CountPending(begin, end, field);
+    } else {
+      ClearRows(mask, begin, end, field);
+    }
+    if (options.backend == Backend::kFast || CountPending(begin, end, field) == 0) {
+      return;
+    }
+    SolveRowsInDouble(stack, rig, options, fast ? Backend::kJacobiSvd : options.backend, kPending,
+                      begin, end, field);
+  });
+  field.summary.resolved_by_reference =
+      options.backend == Backend::kAuto
+          ? std::accumulate(refused.begin(), refused.end(), int64_t{0})
+          : 0;
+  return status;
+}
+
+}  // namespace
+
+std::string_view Name(Backend backend) {
+  for (const auto& [value, name] : kBackendNames) {
+    if (value == backend) {
+      return name;
+    }
+  }
+  return "";
+}
+
+std::optional<Backend> BackendNamed(std::string_view name) {
+  for (const auto& [value, backend_name] : kBackendNames) {
+    if (backend_name == name) {
+      return value;
+    }
+  }
+  return std::nullopt;
+}
+
+Status LambertianOptions::Validate() const {
+  const auto fail = [](std::string_view field, double value, std::string_view range) {
+    return Fail(ErrorCode::kInvalidArgument, "{} = {:g}; need {}", field, value, range);
+  };
+  if (!(shadow_level >= 0.0 && shadow_level < 1.0)) {
+    return fail("shadow_level", shadow_level, "0 <= shadow_level < 1");
+  }
+  if (!(clip_level > 0.0 && clip_level <= 1.0)) {
+    return fail("clip_level", clip_level, "0 < clip_level <= 1");
+  }
+  if (!(dark_level >= 0.0 && dark_level < 1.0)) {
+    return fail("dark_level", dark_level, "0 <= dark_level < 1");
+  }
+  if (!(max_condition >= 2.0 && max_condition <= 1e6)) {
+    return fail("max_condition", max_condition, "2 <= max_condition <= 1e6");
+  }
+  return {};
+}
+
+void NormalField::Resize(ImageSize size) {
+  if (reason.Size() == size) {
+    return;
+  }
+  normal = Image3(size);
+  albedo = Image3(size);
+  residual = Image<float>(size);
+  samples = Image<uint8_t>(size);
+  reason = Image<uint8_t>(size);
+}
+
+Status SolveLambertianInto(const LightStack& stack, const Rig& rig, const std::optional<Mask>& mask,
+                           const LambertianOptions& options, const Task& task, NormalField& field) {
+  const auto start = std::chrono::steady_clock::now();
+  if (Status status =
+          options.Validate().and_then([&] { return CheckInputs(stack, rig, mask, options); });
+      !status) {
+    return status;
+  }
+  const Result<FastRows> fast_rows = FastRows::Make(stack, rig, mask, options);
+  if (!fast_rows) {
+    return tl::unexpected(fast_rows.error());
+  }
+  field.Resize(stack[0].rgb.Size());
+  field.summary = {};
+  if (Status status = SolveAllRows(stack, rig, mask, options, *fast_rows, task, field); !status) {
+    return status;
+  }
+  CountReasons(field.reason, field.summary);
+  field.summary.threads = task.ThreadCount();
+  field.summary.backend = options.backend;
+  field.summary.instruction_set = KernelInstructionSet();
+  field.summary.seconds =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  return {};
+}
+
+Result<NormalField> SolveLambertian(const LightStack& stack, const Rig& rig,
+                                    const std::optional<Mask>& mask,
+                                    const LambertianOptions& options, const Task& task) {
+  NormalField field;
+  if (Status status = SolveLambertianInto(stack, rig, mask, options, task, field); !status) {
+    return tl::unexpected(status.error());
+  }
+  return field;
+}
+
+}  // namespace sateen

@@ -1,0 +1,314 @@
+#include "core/output_folder.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <csignal>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "tests/testing/files.h"
+
+namespace sateen {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+namespace fs = std::filesystem;
+
+constexpr fs::perms kReadOnly = static_cast<fs::perms>(0555);
+
+// Every file and folder below `dir`, sorted, hidden ones too.
+std::vector<std::string> Listing(const fs::path& dir) {
+  std::vector<std::string> names;
+  for (const auto& entry : fs::recursive_directory_iterator(dir)) {
+    names.push_back(fs::relative(entry.path(), dir).string());
+  }
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
+std::string Text(const fs::path& path) { return ReadFileBytes(path).value_or("(absent)"); }
+
+// Permissions do not bind root, as whom tests may run; this user they bind.
+class AsNobody {
+ public:
+  AsNobody() : was_(geteuid()) { EXPECT_TRUE(was_ != 0 || seteuid(65534) == 0); }
+  AsNobody(const AsNobody&) = delete;
+  AsNobody& operator=(const AsNobody&) = delete;
+  ~AsNobody() { EXPECT_EQ(seteuid(was_), 0); }
+
+ private:
+  uid_t was_;
+};
+
+// As on a full disk, no file can grow beyond `bytes`.
+class FullDisk {
+ public:
+  explicit FullDisk(rlim_t bytes) : old_handler_(std::signal(SIGXFSZ, SIG_IGN)) {
+    EXPECT_EQ(getrlimit(RLIMIT_FSIZE, &old_), 0);
+    const rlimit limit = {.rlim_cur = bytes, .rlim_max = old_.rlim_max};
+    EXPECT_EQ(setrlimit(RLIMIT_FSIZE, &limit), 0);
+  }
+  FullDisk(const FullDisk&) = delete;
+  FullDisk& operator=(const FullDisk&) = delete;
+  ~FullDisk() {
+    EXPECT_EQ(setrlimit(RLIMIT_FSIZE, &old_), 0);
+    std::signal(SIGXFSZ, old_handler_);
+  }
+
+ private:
+  void (*old_handler_)(int);
+  rlimit old_ = {};
+};
+
+class OutputFolderTest : public ::testing::Test {
+ protected:
+  const testing::TempFolder temp_;
+  const fs::path dir_ = temp_.Path() / "maps" / "linen";
+};
+
+TEST_F(OutputFolderTest, CommitPutsEveryFileInPlaceAndLeavesNothingElse) {
+  OutputFolder folder = OutputFolder::Open(dir_).value();
+  testing::WriteText(folder.Stage("truth/normal.exr"), "normal");
+  ASSERT_TRUE(folder.WriteText("solve.json", "record"));
+  ASSERT_TRUE(folder.Commit());
+
+  EXPECT_THAT(Listing(dir_), ElementsAre("solve.json", "truth", "truth/normal.exr"));
+  EXPECT_EQ(Text(dir_ / "truth/normal.exr"), "normal");
+  EXPECT_EQ(Text(dir_ / "solve.json"), "record");
+}
+
+TEST_F(OutputFolderTest, NothingIsLeftWithoutCommit) {
+  {
+    OutputFolder folder = OutputFolder::Open(dir_).value();
+    ASSERT_TRUE(folder.WriteText("truth/normal.exr", "normal"));
+    EXPECT_TRUE(fs::exists(dir_));
+  }
+  EXPECT_THAT(Listing(temp_.Path()), IsEmpty());
+}
+
+TEST_F(OutputFolderTest, NothingIsVisibleBeforeCommit) {
+  OutputFolder folder = OutputFolder::Open(dir_).value();
+  ASSERT_TRUE(folder.WriteText("normal.exr", "normal"));
+
+  for (const auto& entry : fs::directory_iterator(dir_)) {
+    EXPECT_THAT(entry.path().filename().string(), ::testing::StartsWith("."));
+  }
+}
+
+TEST_F(OutputFolderTest, OldFilesAreUntouchedWithoutCommit) {
+  testing::WriteText(dir_ / "solve.json", "old");
+  testing::WriteText(dir_ / "notes.txt", "mine");
+  {
+    OutputFolder folder = OutputFolder::Open(dir_).value();
+    ASSERT_TRUE(folder.WriteText("solve.json", "new"));
+    EXPECT_EQ(Text(dir_ / "solve.json"), "old");
+  }
+  EXPECT_THAT(Listing(dir_), ElementsAre("notes.txt", "solve.json"));
+  EXPECT_EQ(Text(dir_ / "solve.json"), "old");
+}
+
+TEST_F(OutputFolderTest, CommitReplacesItsOwnFilesOnly) {
+  testing::WriteText(dir_ / "solve.json", "old");
+  testing::WriteText(dir_ / "notes.txt", "mine");
+  OutputFolder folder = OutputFolder::Open(dir_).value();
+  ASSERT_TRUE(folder.WriteText("solve.json", "new"));
+  ASSERT_TRUE(folder.Commit());
+
+  EXPECT_THAT(Listing(dir_), ElementsAre("notes.txt", "solve.json"));
+  EXPECT_EQ(Text(dir_ / "solve.json"), "new");
+  EXPECT_EQ(Text(dir_ / "notes.txt"), "mine");
+}
+
+TEST_F(OutputFolderTest, FailedCommitNamesTheFileAndPutsOldFilesBack) {
+  testing::WriteText(dir_ / "a.exr", "old a");
+  testing::WriteText(dir_ / "b/notes.txt", "mine");
+  {
+    OutputFolder folder = OutputFolder::Open(dir_).value();
+    ASSERT_TRUE(folder.WriteText("a.exr", "new a"));
+    ASSERT_TRUE(folder.WriteText("b", "new b"));  // where a folder stands
+    const Status committed = folder.Commit();
+    ASSERT_FALSE(committed);
+    EXPECT_EQ(committed.error().code, ErrorCode::kIo);
+    EXPECT_EQ(committed.error().message,
+              (dir_ / "b").string() + ": is a folder where a file must go; move it away");
+  }
+  EXPECT_THAT(Listing(dir_), ElementsAre("a.exr", "b", "b/notes.txt"));
+  EXPECT_EQ(Text(dir_ / "a.exr"), "old a");
+}
+
+TEST_F(OutputFolderTest, CommitThatFailsMidwayTakesBackItsMoves) {
+  testing::WriteText(dir_ / "a.exr", "old a");
+  testing::WriteText(dir_ / "locked/b.exr", "old b");
+  fs::permissions(temp_.Path(), fs::perms::all);
+  fs::permissions(dir_, fs::perms::all);
+  fs::permissions(dir_ / "locked", kReadOnly);
+  {
+    const AsNobody nobody;
+    OutputFolder folder = OutputFolder::Open(dir_).value();
+    ASSERT_TRUE(folder.WriteText("locked/b.exr", "new b"));
+    ASSERT_TRUE(folder.WriteText("a.exr", "new a"));  // the record, moved aside first
+    const Status committed = folder.Commit();
+    ASSERT_FALSE(committed);
+    EXPECT_THAT(committed.error().message, HasSubstr("locked/b.exr: cannot put in place: "));
+  }
+  fs::permissions(dir_ / "locked", fs::perms::owner_all);
+  EXPECT_THAT(Listing(dir_), ElementsAre("a.exr", "locked", "locked/b.exr"));
+  EXPECT_EQ(Text(dir_ / "a.exr"), "old a");
+  EXPECT_EQ(Text(dir_ / "locked/b.exr"), "old b");
+}
+
+TEST_F(OutputFolderTest, CommitFailsForAFileThatWasNeverWritten) {
+  {
+    OutputFolder folder = OutputFolder::Open(dir_).value();
+    ASSERT_TRUE(folder.WriteText("a.exr", "a"));
+    (void)folder.Stage("b.exr");
+    const Status committed = folder.Commit();
+    ASSERT_FALSE(committed);
+    EXPECT_THAT(committed.error().message, HasSubstr((dir_ / "b.exr").string()));
+  }
+  EXPECT_THAT(Listing(temp_.Path()), IsEmpty());
+}
+
+TEST_F(OutputFolderTest, FolderThatSomeoneElseUsesIsKept) {
+  {
+    const OutputFolder folder = OutputFolder::Open(dir_).value();
+    testing::WriteText(dir_ / "notes.txt", "mine");
+  }
+  EXPECT_THAT(Listing(dir_), ElementsAre("notes.txt"));
+}
+
+TEST_F(OutputFolderTest, OnlyTheOwnerOfTheFilesRemovesThem) {
+  std::optional<OutputFolder> moved_to;
+  {
+    OutputFolder folder = OutputFolder::Open(dir_).value();
+    ASSERT_TRUE(folder.WriteText("a.exr", "a"));
+    moved_to.emplace(std::move(folder));
+  }
+  ASSERT_TRUE(moved_to->Commit());
+  EXPECT_THAT(Listing(dir_), ElementsAre("a.exr"));
+}
+
+TEST_F(OutputFolderTest, PathsThatAreFilesAreRefused) {
+  testing::WriteText(temp_.Path() / "file", "mine");
+  for (const fs::path& path : {temp_.Path() / "file", temp_.Path() / "file" / "maps"}) {
+    const Result<OutputFolder> folder = OutputFolder::Open(path);
+    ASSERT_FALSE(folder);
+    EXPECT_EQ(folder.error().code, ErrorCode::kIo);
+    EXPECT_THAT(folder.error().message, HasSubstr("exists and is not a folder"));
+  }
+  EXPECT_EQ(OutputFolder::Open("").error().code, ErrorCode::kIo);
+}
+
+TEST_F(OutputFolderTest, FoldersWithoutWritePermissionAreRefused) {
+  fs::create_directories(dir_);
+  fs::permissions(temp_.Path(), fs::perms::all);
+  fs::permissions(dir_, kReadOnly);
+  {
+    const AsNobody nobody;
+    const Result<OutputFolder> existing = OutputFolder::Open(dir_);
+    ASSERT_FALSE(existing);
+    EXPECT_EQ(existing.error().code, ErrorCode::kIo);
+    EXPECT_EQ(existing.error().message,
+              dir_.string() +
+                  ": cannot write to this folder: Permission denied; get write "
+                  "permission or choose another folder");
+    EXPECT_THAT(OutputFolder::Open(dir_ / "new").error().message,
+                HasSubstr("new: cannot create or enter this folder: Permission denied"));
+    EXPECT_THAT(WriteFileWhole(dir_ / "rig.json", "new").error().message,
+                HasSubstr("cannot write to this folder: Permission denied"));
+  }
+  fs::permissions(dir_, fs::perms::owner_all);
+  EXPECT_THAT(Listing(dir_), IsEmpty());
+}
+
+TEST_F(OutputFolderTest, FullDiskFailsTheWriteAndKeepsOldFiles) {
+  testing::WriteText(dir_ / "solve.json", "old");
+  {
+    const FullDisk full(100);
+    OutputFolder folder = OutputFolder::Open(dir_).value();
+    const Status written = folder.WriteText("solve.json", std::string(1000, 'x'));
+    ASSERT_FALSE(written);
+    EXPECT_EQ(written.error().code, ErrorCode::kIo);
+    EXPECT_EQ(written.error().message,
+              (dir_ / "solve.json").string() + ": cannot write: File too large");
+  }
+  EXPECT_THAT(Listing(dir_), ElementsAre("solve.json"));
+  EXPECT_EQ(Text(dir_ / "solve.json"), "old");
+}
+
+using WriteFileWholeTest = OutputFolderTest;
+
+TEST_F(WriteFileWholeTest, CreatesAndReplaces) {
+  const fs::path path = temp_.Path() / "rig.json";
+  ASSERT_TRUE(WriteFileWhole(path, "first"));
+  EXPECT_EQ(Text(path), "first");
+  ASSERT_TRUE(WriteFileWhole(path, "second"));
+  EXPECT_EQ(Text(path), "second");
+  EXPECT_THAT(Listing(temp_.Path()), ElementsAre("rig.json"));
+}
+
+TEST_F(WriteFileWholeTest, KeepsPermissionsAndSymbolicLinks) {
+  const fs::path path = temp_.Path() / "rig.json";
+  testing::WriteText(path, "old");
+  fs::permissions(path, fs::perms::owner_read | fs::perms::owner_write);
+  fs::create_symlink("rig.json", temp_.Path() / "link.json");
+
+  ASSERT_TRUE(WriteFileWhole(temp_.Path() / "link.json", "new"));
+
+  EXPECT_TRUE(fs::is_symlink(temp_.Path() / "link.json"));
+  EXPECT_EQ(Text(path), "new");
+  EXPECT_EQ(fs::status(path).permissions(), fs::perms::owner_read | fs::perms::owner_write);
+}
+
+TEST_F(WriteFileWholeTest, FullDiskKeepsTheOldFile) {
+  const fs::path path = temp_.Path() / "rig.json";
+  testing::WriteText(path, "old");
+  {
+    const FullDisk full(100);
+    const Status written = WriteFileWhole(path, std::string(1000, 'x'));
+    ASSERT_FALSE(written);
+    EXPECT_EQ(written.error().code, ErrorCode::kIo);
+    EXPECT_EQ(written.error().message, path.string() + ": cannot write: File too large");
+  }
+  EXPECT_THAT(Listing(temp_.Path()), ElementsAre("rig.json"));
+  EXPECT_EQ(Text(path), "old");
+}
+
+TEST_F(WriteFileWholeTest, NeedsAFolderThatExistsAndTheNameOfAFile) {
+  EXPECT_THAT(WriteFileWhole(dir_ / "rig.json", "x").error().message,
+              HasSubstr("No such file or directory; create the folder first"));
+  EXPECT_THAT(WriteFileWhole(temp_.Path(), "x").error().message, HasSubstr("is a folder"));
+}
+
+TEST(ReadFileBytes, GivesEveryByte) {
+  const testing::TempFolder folder;
+  std::string bytes(2'500'000, '\0');  // several pieces, with zeros and newlines
+  for (size_t i = 0; i < bytes.size(); ++i) {
+    bytes[i] = static_cast<char>(i % 251);
+  }
+  testing::WriteText(folder.Path() / "frame.raw", bytes);
+  EXPECT_EQ(ReadFileBytes(folder.Path() / "frame.raw").value(), bytes);
+}
+
+TEST(ReadFileBytes, NamesThePathAndTheReason) {
+  const testing::TempFolder folder;
+  const Result<std::string> of_folder = ReadFileBytes(folder.Path());
+  ASSERT_FALSE(of_folder);
+  EXPECT_EQ(of_folder.error().code, ErrorCode::kIo);
+  EXPECT_EQ(of_folder.error().message, folder.Path().string() + ": cannot read: Is a directory");
+  EXPECT_THAT(ReadFileBytes(folder.Path() / "no").error().message,
+              HasSubstr("/no: cannot read: No such file or directory"));
+}
+
+}  // namespace
+}  // namespace sateen
