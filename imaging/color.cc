@@ -19,8 +19,7 @@ float LinearFromSrgb(float encoded) {
 
 float SrgbFromLinear(float linear) {
   const double v = std::abs(static_cast<double>(linear));
-  const double encoded =
-      v <= kLinearKnee ? v * 12.92 : 1.055 * std::pow(v, 1.0 / 2.4) - 0.055;
+  const double encoded = v <= kLinearKnee ? v * 12.92 : 1.055 * std::pow(v, 1.0 / 2.4) - 0.055;
   return std::copysign(static_cast<float>(encoded), linear);
 }
 

@@ -143,8 +143,7 @@ Result<Image3> ReadInteger(const std::filesystem::path& path, OIIO::ImageInput& 
                 [&linear](T sample) { return linear[sample]; });
 }
 
-Result<Image3> ReadFloat(const std::filesystem::path& path, OIIO::ImageInput& input,
-                         int colours) {
+Result<Image3> ReadFloat(const std::filesystem::path& path, OIIO::ImageInput& input, int colours) {
   const Result<std::vector<float>> samples = ReadSamples<float>(path, input, colours);
   if (!samples) {
     return tl::unexpected(samples.error());
@@ -208,8 +207,8 @@ Result<Decoded> DecodeUnguarded(const std::filesystem::path& path, Encoding enco
   }
   const auto input = OIIO::ImageInput::create(format);
   if (!input) {
-    return Fail(ErrorCode::kBadData, "{}: this OpenImageIO cannot read {} files: {}",
-                path.string(), format, OIIO::geterror());
+    return Fail(ErrorCode::kBadData, "{}: this OpenImageIO cannot read {} files: {}", path.string(),
+                format, OIIO::geterror());
   }
   OIIO::ImageSpec as_stored;
   as_stored.attribute("oiio:UnassociatedAlpha", 1);

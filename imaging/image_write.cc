@@ -31,7 +31,6 @@ Result<std::vector<unsigned char>> Encode(const std::filesystem::path& path, con
   }
   OIIO::ImageSpec spec(size.width, size.height, static_cast<int>(channels),
                        OIIO::BaseTypeFromC<T>::value);
-  spec.attribute("compression", "zip");
   spec.attribute("DateTime", "");  // otherwise EXR gets the time of day, and no two files agree
 
   std::vector<unsigned char> bytes;

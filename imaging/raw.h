@@ -12,14 +12,15 @@
 namespace sateen {
 
 // A camera RAW file as the sensor saw it: one colour a site, linear, black subtracted,
-// 1 = white level. Values below black stay negative.
+// 1 = white level. Values below black stay negative; some sensors read a little above white.
 struct RawMosaic {
-  Image<float> samples;             // the visible area
-  std::array<uint8_t, 4> cfa = {};  // colour (0 red, 1 green, 2 blue) of sites (0,0) (1,0) (0,1) (1,1)
+  Image<float> samples;  // the visible area, at least 2x2, as the sensor lies (unrotated)
+  std::array<uint8_t, 4> cfa = {};  // colour (0 red, 1 green, 2 blue) at (x, y) = 00 10 01 11
   float black = 0.0F;               // [DN], mean over the four sites
   float white = 0.0F;               // [DN]
-  std::array<float, 3> camera_white_balance = {1.0F, 1.0F, 1.0F};  // as shot; green = 1; unused here
-  std::string camera;               // make and model
+  // As shot, green = 1; all 1 where the file does not say. Not applied to the samples.
+  std::array<float, 3> camera_white_balance = {1.0F, 1.0F, 1.0F};
+  std::string camera;  // make and model
   std::optional<double> exposure_s;
   std::optional<double> f_number;
   std::optional<double> iso;
@@ -36,7 +37,8 @@ struct RawMosaic {
 [[nodiscard]] Result<RawMosaic> ReadRawMosaic(const std::filesystem::path& path);
 
 // Camera RGB at every pixel. Bilinear: the mean of the nearest sites of each colour; measured
-// values are kept as they are at their own sites.
+// values are kept as they are at their own sites. At the border the mosaic continues as its mirror
+// image about the outermost row or column, which keeps the colours in their places.
 [[nodiscard]] Image3 Demosaic(const RawMosaic& mosaic);
 
 }  // namespace sateen

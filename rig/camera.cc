@@ -70,13 +70,14 @@ std::optional<Eigen::Vector2d> Undistort(const std::array<double, 5>& distortion
   Eigen::Vector2d x = Eigen::Vector2d::Zero();
   Distorted at_x = Distort(distortion, x);
   Eigen::Vector2d step = distorted;
+  double share = 1.0;  // of the step that is taken
   for (int i = 0; i < kMaxSteps; ++i) {
-    const Eigen::Vector2d next_x = x + step;
+    const Eigen::Vector2d next_x = x + share * step;
     const Distorted at_next = Distort(distortion, next_x);
     const bool closer = (distorted - at_next.x).norm() <= (distorted - at_x.x).norm();
-    const bool converged = step.lpNorm<Eigen::Infinity>() <= kConverged;
+    const bool converged = share == 1.0 && step.lpNorm<Eigen::Infinity>() <= kConverged;
     if (!IsInvertible(distortion, next_x, at_next.jacobian) || (!closer && !converged)) {
-      step /= 2.0;
+      share /= 2.0;
       continue;
     }
     if (converged) {
@@ -85,6 +86,7 @@ std::optional<Eigen::Vector2d> Undistort(const std::array<double, 5>& distortion
     x = next_x;
     at_x = at_next;
     step = at_x.jacobian.inverse() * (distorted - at_x.x);
+    share = 1.0;
   }
   return std::nullopt;
 }

@@ -12,8 +12,8 @@ namespace sateen {
 
 // What the sensor does to light, as far as it is known.
 struct Response {
-  double black = 0.0;  // [DN]
-  double white = 0.0;  // [DN]
+  double black = 0.0;                                       // [DN]
+  double white = 0.0;                                       // [DN]
   Eigen::Vector3d white_balance = Eigen::Vector3d::Ones();  // factors for red, green, blue
   std::optional<double> read_noise_dn;
   std::optional<double> gain_dn_per_electron;
@@ -22,10 +22,10 @@ struct Response {
 // The measured scanner: one camera, K lights, one table. A plain value; docs/formats.md describes
 // the file.
 struct Rig {
-  std::optional<Camera> camera;      // absent only when every light is distant
+  std::optional<Camera> camera;  // absent only when every light is distant
   std::optional<Response> response;
   Lights lights;
-  std::string calibration_json;      // figures and input hashes, kept as they were read
+  std::string calibration_json;  // figures and input hashes, kept as they were read
 
   // kBadData names the first thing that is out of range or missing. `what` is the file.
   [[nodiscard]] Status Validate(std::string_view what) const;

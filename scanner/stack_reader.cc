@@ -22,7 +22,7 @@ Status CheckKind(const fs::path& path) {
   const fs::file_status status = fs::status(path, error);
   if (!fs::exists(status)) {
     return Fail(ErrorCode::kIo, "{}: {}; need a capture: a folder, or an .lp file", path.string(),
-                error ? error.message() : "does not exist");
+                error.message());
   }
   if (!fs::is_directory(status) && LowerCase(path.extension().string()) != ".lp") {
     return Fail(ErrorCode::kBadData,
@@ -230,14 +230,13 @@ Result<Capture> ReadCapture(const fs::path& path, const ReadCaptureOptions& opti
   if (!frames) {
     return tl::unexpected(frames.error());
   }
-  Capture capture{.layout = plan->layout,
-                  .stack = std::move(frames->stack),
-                  .rig = plan->rig,
-                  .mask = {},
-                  .truth = {},
-                  .session = plan->session,
-                  .warnings = plan->warnings,
-                  .sha256_of_input = plan->sha256_of_input};
+  Capture capture;
+  capture.layout = plan->layout;
+  capture.stack = std::move(frames->stack);
+  capture.rig = std::move(plan->rig);
+  capture.session = std::move(plan->session);
+  capture.warnings = std::move(plan->warnings);
+  capture.sha256_of_input = std::move(plan->sha256_of_input);
   capture.sha256_of_input.merge(frames->sha256_of_input);
   WarnOfSrgb(frames->srgb_count, capture);
   if (const Status status = CheckCamera(capture); !status) {

@@ -30,11 +30,11 @@ struct Capture {
 
 struct ReadCaptureOptions {
   // Use only these lights, in this order, by their index from 0 in the capture; empty: all.
-  std::vector<int> lights;
+  std::vector<int> lights = {};
   // Use these instead of what the capture names. The rig has one light for each of the capture's,
   // in the same order; those of a session are matched by name.
-  std::optional<std::filesystem::path> rig_file;
-  std::optional<std::filesystem::path> mask_file;
+  std::optional<std::filesystem::path> rig_file = std::nullopt;
+  std::optional<std::filesystem::path> mask_file = std::nullopt;
   Encoding encoding = Encoding::kAuto;
 };
 

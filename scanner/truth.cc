@@ -3,8 +3,11 @@
 #include <matio.h>
 
 #include <cmath>
+#include <cstdint>
 #include <memory>
+#include <string_view>
 
+#include "core/file_io.h"
 #include "core/sha256.h"
 #include "imaging/image_io.h"
 #include "scanner/folder_listing.h"
@@ -35,7 +38,42 @@ Image3 FromColumnMajor(const double* values, size_t height, size_t width) {
   return image;
 }
 
+uint32_t LittleEndian32(std::string_view bytes, size_t at) {
+  uint32_t value = 0;
+  for (size_t i = 4; i-- > 0;) {
+    value = value << 8U | static_cast<uint8_t>(bytes[at + i]);
+  }
+  return value;
+}
+
+// matio gives zeros for what is missing at the end of a file. A MATLAB 5 file is 128 bytes, the
+// last two "IM", then elements of 8 bytes (type, length) and `length` bytes each, to its end.
+Status CheckMatWhole(const fs::path& path) {
+  const Result<std::string> bytes = ReadFileBytes(path);
+  if (!bytes) {
+    return tl::unexpected(bytes.error());
+  }
+  const std::string_view magic = std::string_view(*bytes).substr(0, 128);
+  if (!magic.starts_with("MATLAB 5.0") || !magic.ends_with("IM")) {
+    return Fail(ErrorCode::kBadData,
+                "{}: is no little-endian MATLAB 5 file; need one, as `save -v7` writes it",
+                path.string());
+  }
+  size_t end = magic.size();
+  while (end + 8 <= bytes->size()) {
+    end += 8 + size_t{LittleEndian32(*bytes, end + 4)};
+  }
+  if (end != bytes->size() || end == magic.size()) {
+    return Fail(ErrorCode::kBadData, "{}: the MATLAB file is cut short at {} bytes; copy it again",
+                path.string(), bytes->size());
+  }
+  return {};
+}
+
 Result<Image3> ReadMatNormals(const fs::path& path) {
+  if (const Status status = CheckMatWhole(path); !status) {
+    return tl::unexpected(status.error());
+  }
   const MatFile file(Mat_Open(path.c_str(), MAT_ACC_RDONLY), Mat_Close);
   if (file == nullptr) {
     return Fail(ErrorCode::kBadData, "{}: cannot be read as a MATLAB file", path.string());

@@ -73,9 +73,10 @@ inline void WriteDiligent(const std::filesystem::path& dir) {
 // Four distant lights "east", "west", "north", "south".
 inline Rig FourLights() {
   Rig rig;
-  const std::vector<std::pair<std::string, Eigen::Vector3d>> lights = {
-      {"east", {0.6, 0, 0.8}}, {"west", {-0.6, 0, 0.8}}, {"north", {0, 0.6, 0.8}},
-      {"south", {0, -0.6, 0.8}}};
+  const std::vector<std::pair<std::string, Eigen::Vector3d>> lights = {{"east", {0.6, 0, 0.8}},
+                                                                       {"west", {-0.6, 0, 0.8}},
+                                                                       {"north", {0, 0.6, 0.8}},
+                                                                       {"south", {0, -0.6, 0.8}}};
   for (const auto& [name, direction] : lights) {
     Light light;
     light.name = name;

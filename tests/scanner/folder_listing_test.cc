@@ -15,8 +15,8 @@ TEST(NaturalLess, ComparesNumbersByValue) {
   std::vector<std::string> names = {"cat.10.tga", "cat.2.tga", "cat.2b.tga", "cat.1.tga",
                                     "Cat.9.tga",  "cat.tga",   "cat.02.tga"};
   std::sort(names.begin(), names.end(), NaturalLess);
-  EXPECT_THAT(names, ElementsAre("Cat.9.tga", "cat.1.tga", "cat.02.tga", "cat.2.tga",
-                                 "cat.2b.tga", "cat.10.tga", "cat.tga"));
+  EXPECT_THAT(names, ElementsAre("Cat.9.tga", "cat.1.tga", "cat.02.tga", "cat.2.tga", "cat.2b.tga",
+                                 "cat.10.tga", "cat.tga"));
 }
 
 TEST(NaturalLess, OrdersNumbersBeyondAnyInteger) {
@@ -79,8 +79,7 @@ TEST(DescribeFolder, CountsFilesByTheirEnding) {
   for (const char* name : {"a.png", "b.PNG", "c.txt", "README", "raw/d.nef"}) {
     WriteText(temp.Path() / name, "");
   }
-  EXPECT_EQ(DescribeFolder(temp.Path()),
-            "4 files (1 without ending, 2 .png, 1 .txt), 1 folder");
+  EXPECT_EQ(DescribeFolder(temp.Path()), "4 files (1 without ending, 2 .png, 1 .txt), 1 folder");
 }
 
 }  // namespace

@@ -7,11 +7,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
+using testing::FailureOf;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
-using ::testing::SizeIs;
-using testing::FailureOf;
 using testing::IsError;
+using ::testing::SizeIs;
 using testing::TempFolder;
 using testing::WriteFlat;
 using testing::WriteText;
@@ -51,11 +51,12 @@ TEST(Lp, ReadsTheLinesInTheirOrder) {
 }
 
 TEST(Lp, AcceptsNamesWithBlanksAndPathsOfAnotherMachine) {
-  const Result<Capture> capture =
-      ReadLp("\xEF\xBB\xBF" "3\r\n"
-             "C:\\Users\\me\\RTI run\\a.exr\t0.6 0 0.8\r\n"
-             "b 2  final.exr -0.6 0 0.8\r\n"
-             "/home/me/c.exr 0 0.6 0.8\r\n\r\n");
+  const Result<Capture> capture = ReadLp(
+      "\xEF\xBB\xBF"
+      "3\r\n"
+      "C:\\Users\\me\\RTI run\\a.exr\t0.6 0 0.8\r\n"
+      "b 2  final.exr -0.6 0 0.8\r\n"
+      "/home/me/c.exr 0 0.6 0.8\r\n\r\n");
   ASSERT_TRUE(capture) << capture.error().message;
   EXPECT_THAT(capture->stack[0].name, HasSubstr("/a.exr"));
   EXPECT_THAT(capture->stack[1].name, HasSubstr("/b 2  final.exr"));

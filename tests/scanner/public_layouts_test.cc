@@ -7,12 +7,12 @@ namespace {
 
 namespace fs = std::filesystem;
 
+using testing::FailureOf;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
-using ::testing::SizeIs;
-using testing::FailureOf;
 using testing::IsError;
 using testing::Lines;
+using ::testing::SizeIs;
 using testing::TempFolder;
 using testing::WriteFlat;
 using testing::WriteText;

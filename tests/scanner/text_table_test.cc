@@ -22,7 +22,9 @@ Result<std::vector<NumberRow>> RowsOf(const std::string& text) {
 
 TEST(ReadTextLines, AcceptsWhatEditorsOfAnySystemLeave) {
   const TempFolder temp;
-  const std::string text = "\xEF\xBB\xBF" "one two\r\n\r\n\t three\t \n\n  \n";
+  const std::string text =
+      "\xEF\xBB\xBF"
+      "one two\r\n\r\n\t three\t \n\n  \n";
   WriteText(temp.Path() / "t.txt", text);
   std::map<std::string, std::string> hashes;
 
@@ -55,17 +57,20 @@ TEST(ReadNumberRows, ReadsEveryUsualFormOfANumber) {
 }
 
 TEST(ReadNumberRows, NamesTheWordThatIsNoFiniteNumberAndItsLine) {
-  for (const char* word : {"abc", "1,5", "nan", "inf", "1e999", "0x10", "1.2.3", "+", "+-1", "--1"}) {
+  for (const char* word :
+       {"abc", "1,5", "nan", "inf", "1e999", "0x10", "1.2.3", "+", "+-1", "--1"}) {
     const auto rows = RowsOf(fmt::format("1 2 3\n\n4 {} 6\n", word));
     ASSERT_FALSE(rows) << word;
-    EXPECT_THAT(rows.error(), IsError(ErrorCode::kBadData, fmt::format("t.txt:3: found '{}'", word)));
+    EXPECT_THAT(rows.error(),
+                IsError(ErrorCode::kBadData, fmt::format("t.txt:3: found '{}'", word)));
   }
 }
 
 TEST(ReadNumberRows, ShowsBinaryContentAsPrintableText) {
   const auto rows = RowsOf(std::string("\xFF\xFE\x00\x01zz", 6) + std::string(100, 'q'));
   ASSERT_FALSE(rows);
-  EXPECT_THAT(rows.error(), IsError(ErrorCode::kBadData, "found '????zz" + std::string(34, 'q') + "...'"));
+  EXPECT_THAT(rows.error(),
+              IsError(ErrorCode::kBadData, "found '????zz" + std::string(34, 'q') + "...'"));
 }
 
 }  // namespace

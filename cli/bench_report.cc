@@ -1,0 +1,169 @@
+#include "cli/bench_report.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+namespace sateen::cli {
+namespace {
+
+// Errors below this are shown as this: the rounding of a float normal.
+constexpr double kLeastErrorDeg = 1e-6;
+
+// A logarithmic axis of the plot.
+struct LogAxis {
+  double from;   // value at `begin`
+  double to;     // value at `end`
+  double begin;  // [px]
+  double end;    // [px]
+
+  [[nodiscard]] double At(double value) const {
+    const double t = std::log10(std::clamp(value, from, to) / from) / std::log10(to / from);
+    return begin + t * (end - begin);
+  }
+};
+
+struct Style {
+  std::string_view name;
+  std::string_view color;
+};
+
+constexpr std::array<Style, 3> kCases = {
+    {{"clean", "#1b7837"}, {"noisy", "#2166ac"}, {"hard", "#b2182b"}}};
+
+std::string ColorOf(std::string_view case_name) {
+  const auto* found = std::find_if(kCases.begin(), kCases.end(),
+                                   [&](const Style& style) { return style.name == case_name; });
+  return std::string(found == kCases.end() ? "#000000" : found->color);
+}
+
+std::string Text(double x, double y, std::string_view anchor, std::string_view text,
+                 std::string_view color = "#333333") {
+  return fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"{}\" fill=\"{}\">{}</text>\n",
+                     x, y, anchor, color, text);
+}
+
+std::string Line(double x1, double y1, double x2, double y2, std::string_view style) {
+  return fmt::format("<line x1=\"{:.1f}\" y1=\"{:.1f}\" x2=\"{:.1f}\" y2=\"{:.1f}\" {}/>\n", x1, y1,
+                     x2, y2, style);
+}
+
+// A grid line and a label at each power of ten.
+std::string Grid(const LogAxis& x, const LogAxis& y) {
+  constexpr std::string_view kGridStyle = "stroke=\"#dddddd\"";
+  std::string svg;
+  for (double value = x.from; value <= x.to * 1.001; value *= 10.0) {
+    svg += Line(x.At(value), y.begin, x.At(value), y.end, kGridStyle);
+    svg += Text(x.At(value), y.begin + 18.0, "middle", fmt::format("{:g}", value));
+  }
+  for (double value = y.from; value <= y.to * 1.001; value *= 10.0) {
+    svg += Line(x.begin, y.At(value), x.end, y.At(value), kGridStyle);
+    svg += Text(x.begin - 8.0, y.At(value) + 4.0, "end", fmt::format("{:g}", value));
+  }
+  return svg;
+}
+
+std::string Marks(const BenchReport& report, const LogAxis& x, const LogAxis& y) {
+  std::string svg;
+  for (const BenchRow& row : report.rows) {
+    if (row.threads != report.floors.back().threads) {
+      continue;
+    }
+    const double px = x.At(row.ns_per_pixel);
+    const double py = y.At(std::max(row.angular_error_deg.mean, kLeastErrorDeg));
+    const std::string color = ColorOf(row.case_name);
+    svg +=
+        fmt::format("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"5\" fill=\"{}\"/>\n", px, py, color);
+    // fast and auto lie close together: one label above its mark, the other below.
+    const double dy = row.backend == Backend::kAuto ? 18.0 : -9.0;
+    svg += Text(px, py + dy, "middle", Name(row.backend), color);
+  }
+  return svg;
+}
+
+}  // namespace
+
+std::string JsonReport(const BenchReport& report) {
+  nlohmann::json json = {{"schema", "sateen.bench.solve/1"},
+                         {"size_px", {report.size.width, report.size.height}},
+                         {"lights", report.lights},
+                         {"instruction_set", report.instruction_set},
+                         {"floor_gb_per_s", report.floors.back().gb_per_s},
+                         {"floors", nlohmann::json::array()},
+                         {"rows", nlohmann::json::array()}};
+  for (const BenchFloor& floor : report.floors) {
+    json["floors"].push_back({{"threads", floor.threads},
+                              {"ns_per_pixel", floor.ns_per_pixel},
+                              {"gb_per_s", floor.gb_per_s}});
+  }
+  for (const BenchRow& row : report.rows) {
+    json["rows"].push_back({{"backend", Name(row.backend)},
+                            {"case", row.case_name},
+                            {"threads", row.threads},
+                            {"ns_per_pixel", row.ns_per_pixel},
+                            {"times_jacobi_svd", row.times_jacobi_svd},
+                            {"times_floor", row.times_floor},
+                            {"solved_fraction", row.solved_fraction},
+                            {"angular_error_deg",
+                             {{"mean", row.angular_error_deg.mean},
+                              {"p99", row.angular_error_deg.p99},
+                              {"max", row.angular_error_deg.max}}},
+                            {"albedo_error", row.albedo_error}});
+  }
+  return json.dump();
+}
+
+std::string TextReport(const BenchReport& report) {
+  std::string text = fmt::format("{} near lights, {}x{} px, RGB and luminance, {}\n", report.lights,
+                                 report.size.width, report.size.height, report.instruction_set);
+  for (const BenchFloor& floor : report.floors) {
+    text += fmt::format("floor, {} thread{}: {:.2f} ns/px ({:.1f} GB/s, the same bytes moved)\n",
+                        floor.threads, floor.threads == 1 ? " " : "s", floor.ns_per_pixel,
+                        floor.gb_per_s);
+  }
+  text += fmt::format("{:<6} {:<10} {:>7} {:>9} {:>10} {:>7} {:>8} {:>10} {:>10} {:>10} {:>10}\n",
+                      "case", "backend", "threads", "ns/px", "x jacobi", "x floor", "solved %",
+                      "mean deg", "p99 deg", "max deg", "albedo %");
+  for (const BenchRow& row : report.rows) {
+    text += fmt::format(
+        "{:<6} {:<10} {:>7} {:>9.2f} {:>10.1f} {:>7.1f} {:>8.2f} {:>10.3g} {:>10.3g} {:>10.3g} "
+        "{:>10.3g}\n",
+        row.case_name, Name(row.backend), row.threads, row.ns_per_pixel, row.times_jacobi_svd,
+        row.times_floor, 100.0 * row.solved_fraction, row.angular_error_deg.mean,
+        row.angular_error_deg.p99, row.angular_error_deg.max, 100.0 * row.albedo_error);
+  }
+  text +=
+      "x jacobi: times as fast as jacobi-svd on as many threads; x floor: times as slow as the "
+      "floor";
+  return text;
+}
+
+std::string SvgPlot(const BenchReport& report) {
+  const LogAxis x{1.0, 10000.0, 70.0, 660.0};
+  const LogAxis y{kLeastErrorDeg, 10.0, 400.0, 40.0};
+  const BenchFloor& floor = report.floors.back();
+  std::string svg =
+      "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"700\" height=\"460\" "
+      "font-family=\"sans-serif\" font-size=\"12\">\n"
+      "<rect width=\"700\" height=\"460\" fill=\"#ffffff\"/>\n";
+  svg += Text(365.0, 22.0, "middle",
+              fmt::format("{} near lights, {} threads, {}: lower left is better", report.lights,
+                          floor.threads, report.instruction_set));
+  svg += Grid(x, y);
+  svg += Line(x.At(floor.ns_per_pixel), y.begin, x.At(floor.ns_per_pixel), y.end,
+              "stroke=\"#888888\" stroke-dasharray=\"4 3\"");
+  svg += Text(x.At(floor.ns_per_pixel) + 4.0, y.end + 12.0, "start", "memory bandwidth");
+  svg += Marks(report, x, y);
+  for (size_t i = 0; i < kCases.size(); ++i) {
+    svg +=
+        Text(650.0, 60.0 + 16.0 * static_cast<double>(i), "end", kCases[i].name, kCases[i].color);
+  }
+  svg += Text(365.0, 440.0, "middle", "time [ns/pixel]");
+  svg +=
+      "<text transform=\"translate(18 220) rotate(-90)\" text-anchor=\"middle\" "
+      "fill=\"#333333\">mean angular error [degrees]</text>\n</svg>\n";
+  return svg;
+}
+
+}  // namespace sateen::cli

@@ -1,0 +1,64 @@
+#include <CLI/CLI.hpp>
+#include <exception>
+#include <iostream>
+#include <new>
+
+#include "cli/bench_solve.h"
+#include "cli/simulate.h"
+#include "cli/solve.h"
+#include "core/interrupt.h"
+#include "core/progress_bar.h"
+
+namespace {
+
+constexpr int kInternal = 1;
+constexpr int kUsage = 2;
+
+int Run(int argc, char** argv) {
+  CLI::App app("Photometric-stereo scanner: from frames to normal and albedo maps", "sateen");
+  app.require_subcommand(1);
+  app.set_version_flag("--version", "sateen " SATEEN_VERSION);
+  app.footer(
+      "Exit status: 0 done, 1 internal error, 2 usage, 3 bad or degenerate data, 4 input or "
+      "output,\n             5 device, 6 cancelled.");
+  sateen::cli::SolveArgs solve;
+  sateen::cli::AddSolve(app, solve);
+  sateen::cli::SimulateArgs simulate;
+  sateen::cli::AddSimulate(app, simulate);
+  CLI::App* bench = app.add_subcommand("bench", "Measure speed against error on this machine");
+  bench->require_subcommand(1);
+  sateen::cli::BenchSolveArgs bench_solve;
+  sateen::cli::AddBenchSolve(*bench, bench_solve);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : kUsage;
+  }
+  sateen::InstallInterruptHandlers();
+  sateen::ProgressBar progress(2);
+  const auto task = [&](int threads) {
+    return sateen::Task{
+        .threads = threads, .progress = &progress, .cancel = &sateen::InterruptFlag()};
+  };
+  if (app.got_subcommand("solve")) {
+    return RunSolve(solve, task(solve.threads), std::cout, std::cerr);
+  }
+  if (app.got_subcommand("simulate")) {
+    return RunSimulate(simulate, task(simulate.threads), std::cout, std::cerr);
+  }
+  return RunBenchSolve(bench_solve, task(bench_solve.threads), std::cout, std::cerr);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    return Run(argc, argv);
+  } catch (const std::bad_alloc&) {
+    std::cerr << "sateen: error: out of memory; use smaller images or fewer lights at a time\n";
+    return kInternal;
+  } catch (const std::exception& error) {
+    std::cerr << "sateen: internal error: " << error.what() << '\n';
+    return kInternal;
+  }
+}

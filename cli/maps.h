@@ -1,0 +1,24 @@
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "core/error.h"
+#include "core/output_folder.h"
+#include "imaging/light_stack.h"
+#include "solver/lambertian.h"
+
+namespace sateen::cli {
+
+struct MapsOptions {
+  bool normal_y_down = false;  // the DirectX convention instead of OpenGL's
+};
+
+/// Stages the maps of a solve: normal.exr and .png, albedo.exr, residual.exr, samples.png,
+/// reason.png and overview.png (a frame, the normals, the albedo, and the error or, without truth,
+/// the residual). `angular_error_deg` also goes to error.exr.
+[[nodiscard]] Status StageMaps(const NormalField& field, const LightFrame& first_frame,
+                               const std::optional<Image<float>>& angular_error_deg,
+                               const MapsOptions& options, OutputFolder& folder);
+
+}  // namespace sateen::cli

@@ -1,0 +1,20 @@
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <filesystem>
+#include <iosfwd>
+
+#include "core/task.h"
+
+namespace sateen::cli {
+
+struct SimulateArgs {
+  std::filesystem::path scene;
+  std::filesystem::path output;
+  int threads = 0;
+};
+
+void AddSimulate(CLI::App& root, SimulateArgs& args);
+int RunSimulate(const SimulateArgs& args, const Task& task, std::ostream& out, std::ostream& log);
+
+}  // namespace sateen::cli

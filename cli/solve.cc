@@ -1,0 +1,179 @@
+#include "cli/solve.h"
+
+#include <chrono>
+#include <map>
+#include <ostream>
+#include <utility>
+
+#include "cli/maps.h"
+#include "cli/solve_report.h"
+#include "core/output_folder.h"
+
+namespace sateen::cli {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double SecondsSince(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+Encoding EncodingNamed(const std::string& name) {
+  if (name == "linear") {
+    return Encoding::kLinear;
+  }
+  return name == "srgb" ? Encoding::kSrgb : Encoding::kAuto;
+}
+
+ReadCaptureOptions ReadOptionsOf(const SolveArgs& args) {
+  ReadCaptureOptions options = args.read;
+  options.encoding = EncodingNamed(args.encoding);
+  if (!args.rig_file.empty()) {
+    options.rig_file = args.rig_file;
+  }
+  if (!args.mask_file.empty()) {
+    options.mask_file = args.mask_file;
+  }
+  return options;
+}
+
+// Compares with truth where there is any; `error_map_deg` receives the angles.
+Status Evaluate(SolveOutcome& outcome, std::optional<Image<float>>& error_map_deg) {
+  const std::optional<Truth>& truth = outcome.capture.truth;
+  if (!truth) {
+    return {};
+  }
+  Image<float> map;
+  const Result<ErrorStatistics> angle = AngularErrorDeg(outcome.field, truth->normal, &map);
+  if (!angle) {
+    return tl::unexpected(angle.error());
+  }
+  if (angle->pixels == 0) {
+    return {};
+  }
+  outcome.angular_error_deg = *angle;
+  error_map_deg = std::move(map);
+  if (truth->albedo) {
+    const Result<ErrorStatistics> albedo = RelativeAlbedoError(outcome.field, *truth->albedo);
+    if (!albedo) {
+      return tl::unexpected(albedo.error());
+    }
+    outcome.albedo_error = *albedo;
+  }
+  return {};
+}
+
+// Reads, solves, compares and writes. Nothing is left behind where any of it fails.
+Result<SolveOutcome> SolveCapture(const SolveArgs& args, const Task& task, std::ostream& log) {
+  const Clock::time_point start = Clock::now();
+  LambertianOptions options = args.solver;
+  options.backend = *BackendNamed(args.backend);
+  if (Status status = options.Validate(); !status) {
+    return tl::unexpected(status.error());
+  }
+  Result<Capture> capture = ReadCapture(args.capture, ReadOptionsOf(args), task);
+  if (!capture) {
+    return tl::unexpected(capture.error());
+  }
+  for (const std::string& warning : capture->warnings) {
+    log << "sateen solve: warning: " << warning << '\n';
+  }
+  SolveOutcome outcome;
+  outcome.capture = std::move(*capture);
+  outcome.seconds_reading = SecondsSince(start);
+  // Before the work, so that a folder that cannot be written to is told at once.
+  Result<OutputFolder> folder = OutputFolder::Open(args.output);
+  if (!folder) {
+    return tl::unexpected(folder.error());
+  }
+  Result<NormalField> field = SolveLambertian(outcome.capture.stack, outcome.capture.rig,
+                                              outcome.capture.mask, options, task);
+  if (!field) {
+    return tl::unexpected(field.error());
+  }
+  outcome.field = std::move(*field);
+  std::optional<Image<float>> error_map_deg;
+  Status status = Evaluate(outcome, error_map_deg);
+  if (status) {
+    status = StageMaps(outcome.field, outcome.capture.stack.front(), error_map_deg,
+                       {.normal_y_down = args.normal_y == "down"}, *folder);
+  }
+  if (status) {
+    status = task.CheckCancelled();
+  }
+  outcome.seconds_total = SecondsSince(start);
+  if (status) {
+    status = folder->WriteText("solve.json", JsonReport(args, outcome) + "\n");
+  }
+  if (status) {
+    status = folder->Commit();
+  }
+  if (!status) {
+    return tl::unexpected(status.error());
+  }
+  return outcome;
+}
+
+}  // namespace
+
+void AddSolve(CLI::App& root, SolveArgs& args) {
+  CLI::App* cmd =
+      root.add_subcommand("solve", "Solve surface normal and albedo for every pixel of a capture");
+  cmd->add_option(
+         "capture", args.capture,
+         "A session folder (session.json), a DiLiGenT folder, an RTI .lp file, or a folder "
+         "of images with a lights.txt in it or beside it")
+      ->required();
+  cmd->add_option("-o,--output", args.output, "Folder for the maps; made where missing")
+      ->required();
+  cmd->add_option("--rig", args.rig_file, "rig.json to use instead of the capture's own lights");
+  cmd->add_option("--mask", args.mask_file,
+                  "Image that is white where to solve, instead of the capture's own mask");
+  cmd->add_option("--lights", args.read.lights, "Use only these lights, by index: 0,10,20")
+      ->delimiter(',');
+  cmd->add_option("--backend", args.backend,
+                  "How the least squares are solved; auto is fast, and the reference (jacobi-svd) "
+                  "where fast is not exact enough")
+      ->check(CLI::IsMember({"auto", "fast", "jacobi-svd", "qr", "ldlt"}))
+      ->capture_default_str();
+  cmd->add_option("--robust", args.robust, "Robust estimator for samples off the Lambertian model")
+      ->check(CLI::IsMember({"none"}))
+      ->capture_default_str();
+  cmd->add_option("--shadow-level", args.solver.shadow_level,
+                  "Leave out samples at or below this fraction of the pixel's brightest [0, 1)")
+      ->capture_default_str();
+  cmd->add_option("--clip-level", args.solver.clip_level,
+                  "Leave out samples at or above this fraction of full scale (0, 1]")
+      ->capture_default_str();
+  cmd->add_option("--dark-level", args.solver.dark_level,
+                  "Pixels with no sample above this fraction of full scale are dark [0, 1)")
+      ->capture_default_str();
+  cmd->add_option("--max-condition", args.solver.max_condition,
+                  "Pixels whose usable lights have a larger condition number are not solved "
+                  "[2, 1e6]")
+      ->capture_default_str();
+  cmd->add_option("--normal-y", args.normal_y,
+                  "Normal maps with y up (OpenGL, glTF) or down (DirectX)")
+      ->check(CLI::IsMember({"up", "down"}))
+      ->capture_default_str();
+  cmd->add_option("--encoding", args.encoding,
+                  "What integer files hold; auto: 8 bits are sRGB, 16 bits are linear")
+      ->check(CLI::IsMember({"auto", "linear", "srgb"}))
+      ->capture_default_str();
+  cmd->add_option("--threads", args.threads, "Threads to use; 0: one for each core")
+      ->check(CLI::Range(0, 1024))
+      ->capture_default_str();
+  cmd->add_flag("--json", args.json, "Print the report as one JSON object on stdout");
+}
+
+int RunSolve(const SolveArgs& args, const Task& task, std::ostream& out, std::ostream& log) {
+  const Result<SolveOutcome> outcome = SolveCapture(args, task, log);
+  if (!outcome) {
+    log << "sateen solve: error: " << outcome.error().message << '\n';
+    return ExitStatus(outcome.error());
+  }
+  out << (args.json ? JsonReport(args, *outcome) : TextReport(args, *outcome)) << '\n';
+  return 0;
+}
+
+}  // namespace sateen::cli

@@ -1,0 +1,46 @@
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <filesystem>
+#include <iosfwd>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/task.h"
+#include "scanner/stack_reader.h"
+#include "solver/evaluate.h"
+#include "solver/lambertian.h"
+
+namespace sateen::cli {
+
+struct SolveArgs {
+  std::filesystem::path capture;
+  std::filesystem::path output;
+  ReadCaptureOptions read;
+  std::string rig_file;   // empty: the capture's own
+  std::string mask_file;  // empty: the capture's own
+  std::string encoding = "auto";
+  std::string backend = "auto";
+  std::string robust = "none";
+  std::string normal_y = "up";
+  LambertianOptions solver;
+  int threads = 0;
+  bool json = false;
+};
+
+// Everything that a report speaks of.
+struct SolveOutcome {
+  Capture capture;
+  NormalField field;
+  std::optional<ErrorStatistics> angular_error_deg;
+  std::optional<ErrorStatistics> albedo_error;
+  double seconds_reading = 0.0;
+  double seconds_total = 0.0;
+};
+
+void AddSolve(CLI::App& root, SolveArgs& args);
+// Returns the program's exit status. Results go to `out`, warnings and errors to `log`.
+int RunSolve(const SolveArgs& args, const Task& task, std::ostream& out, std::ostream& log);
+
+}  // namespace sateen::cli

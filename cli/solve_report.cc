@@ -1,0 +1,107 @@
+#include "cli/solve_report.h"
+
+#include <nlohmann/json.hpp>
+
+namespace sateen::cli {
+namespace {
+
+nlohmann::json ToJson(const ErrorStatistics& error) {
+  return {{"mean", error.mean},
+          {"median", error.median},
+          {"p99", error.p99},
+          {"max", error.max},
+          {"pixels", error.pixels}};
+}
+
+nlohmann::json OptionsToJson(const SolveArgs& args) {
+  return {{"backend", args.backend},
+          {"robust", args.robust},
+          {"lights", args.read.lights},
+          {"shadow_level", args.solver.shadow_level},
+          {"clip_level", args.solver.clip_level},
+          {"dark_level", args.solver.dark_level},
+          {"max_condition", args.solver.max_condition},
+          {"normal_y", args.normal_y},
+          {"encoding", args.encoding}};
+}
+
+// "123 dark, 4 saturated", or nothing.
+std::string UnsolvedWords(const SolveSummary& summary) {
+  std::string words;
+  const auto add = [&](int64_t count, std::string_view reason) {
+    if (count > 0) {
+      words += fmt::format("{}{} {}", words.empty() ? "" : ", ", count, reason);
+    }
+  };
+  add(summary.dark, "dark");
+  add(summary.too_few_samples, "with fewer than 3 usable samples");
+  add(summary.saturated, "saturated");
+  add(summary.ill_conditioned, "ill-conditioned");
+  return words;
+}
+
+}  // namespace
+
+std::string JsonReport(const SolveArgs& args, const SolveOutcome& outcome) {
+  const SolveSummary& summary = outcome.field.summary;
+  const ImageSize size = outcome.field.normal.Size();
+  nlohmann::json report = {{"schema", "sateen.solve/1"},
+                           {"capture", args.capture.string()},
+                           {"layout", outcome.capture.layout},
+                           {"output", args.output.string()},
+                           {"size_px", {size.width, size.height}},
+                           {"lights", outcome.capture.stack.size()},
+                           {"pixels", summary.pixels},
+                           {"solved", summary.solved},
+                           {"unsolved",
+                            {{"dark", summary.dark},
+                             {"too_few_samples", summary.too_few_samples},
+                             {"saturated", summary.saturated},
+                             {"ill_conditioned", summary.ill_conditioned}}},
+                           {"resolved_by_reference", summary.resolved_by_reference},
+                           {"seconds", summary.seconds},
+                           {"seconds_reading", outcome.seconds_reading},
+                           {"seconds_total", outcome.seconds_total},
+                           {"threads", summary.threads},
+                           {"backend", Name(summary.backend)},
+                           {"instruction_set", summary.instruction_set},
+                           {"options", OptionsToJson(args)},
+                           {"warnings", outcome.capture.warnings},
+                           {"inputs", outcome.capture.sha256_of_input}};
+  if (outcome.angular_error_deg) {
+    report["truth"] = outcome.capture.truth->source;
+    report["angular_error_deg"] = ToJson(*outcome.angular_error_deg);
+  }
+  if (outcome.albedo_error) {
+    report["albedo_error"] = ToJson(*outcome.albedo_error);
+  }
+  return report.dump();
+}
+
+std::string TextReport(const SolveArgs& args, const SolveOutcome& outcome) {
+  const SolveSummary& summary = outcome.field.summary;
+  const ImageSize size = outcome.field.normal.Size();
+  std::string text = fmt::format(
+      "solved {} of {} pixels ({}x{} px, {} lights) in {:.3f} s, {} thread{}, backend {} ({})\n",
+      summary.solved, summary.pixels, size.width, size.height, outcome.capture.stack.size(),
+      summary.seconds, summary.threads, summary.threads == 1 ? "" : "s", Name(summary.backend),
+      summary.instruction_set);
+  if (const std::string words = UnsolvedWords(summary); !words.empty()) {
+    text += fmt::format("unsolved: {} (see reason.png)\n", words);
+  }
+  if (outcome.angular_error_deg) {
+    const ErrorStatistics& error = *outcome.angular_error_deg;
+    text += fmt::format(
+        "angular error against {}: mean {:.4g}, median {:.4g}, p99 {:.4g}, max {:.4g} degrees\n",
+        outcome.capture.truth->source, error.mean, error.median, error.p99, error.max);
+  }
+  if (outcome.albedo_error) {
+    text += fmt::format("albedo error: mean {:.3g} %, max {:.3g} %\n",
+                        100.0 * outcome.albedo_error->mean, 100.0 * outcome.albedo_error->max);
+  }
+  text += fmt::format("maps are in {}; look at {}", args.output.string(),
+                      (args.output / "overview.png").string());
+  return text;
+}
+
+}  // namespace sateen::cli

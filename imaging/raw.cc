@@ -1,0 +1,266 @@
+#include "imaging/raw.h"
+
+#include <libraw/libraw.h>
+
+#include <algorithm>
+#include <cctype>
+#include <exception>
+#include <memory>
+#include <string_view>
+
+#include "core/check.h"
+#include "imaging/file_check.h"
+
+namespace sateen {
+namespace {
+
+constexpr uint8_t kRed = 0;
+constexpr uint8_t kGreen = 1;
+constexpr uint8_t kBlue = 2;
+
+// LibRaw numbers the green of the other rows 3.
+uint8_t ColourOf(int libraw_colour) {
+  return libraw_colour == 3 ? kGreen : static_cast<uint8_t>(libraw_colour);
+}
+
+Status CheckDecoded(const std::filesystem::path& path, LibRaw& raw, int open_or_unpack) {
+  // Decoders that meet the end of the data may go on with zeros and only count the errors.
+  const int damaged = raw.error_count();
+  if (open_or_unpack == LIBRAW_SUCCESS && damaged == 0) {
+    return {};
+  }
+  return Fail(ErrorCode::kBadData,
+              "{}: cannot be decoded as camera RAW ({}); it is damaged, cut short or of a camera "
+              "that LibRaw {} does not know: copy it again, or convert it to DNG",
+              path.string(),
+              open_or_unpack != LIBRAW_SUCCESS ? LibRaw::strerror(open_or_unpack)
+                                               : fmt::format("{} damaged samples", damaged).c_str(),
+              LibRaw::version());
+}
+
+// What keeps the file from being one integer sample a site under a 2x2 red, green, blue pattern;
+// empty if nothing does.
+std::string_view NotBayer(LibRaw& raw) {
+  const libraw_data_t& data = raw.imgdata;
+  const libraw_iparams_t& id = data.idata;
+  if (id.is_foveon != 0 || id.filters == 0) {
+    return "three colours at every pixel (linear DNG, sRAW or Foveon)";
+  }
+  if (id.filters == LIBRAW_XTRANS) {
+    return "a 6x6 X-Trans pattern";
+  }
+  if (raw.is_floating_point() != 0) {
+    return "floating-point samples";
+  }
+  const bool rotated = data.rawdata.ioparams.fuji_width != 0;
+  if (data.rawdata.raw_image == nullptr || id.filters < 1000 || id.colors != 3 || rotated) {
+    return "a pattern that is not 2x2";
+  }
+  if (data.rawdata.ph1_cblack != nullptr || data.rawdata.ph1_rblack != nullptr) {
+    return "a black level for each row or column (Phase One)";
+  }
+  const auto colour = [&raw](int x, int y) { return ColourOf(raw.COLOR(y, x)); };
+  for (int y = 0; y < 8; ++y) {  // LibRaw keeps eight rows of the pattern
+    if (colour(0, y) != colour(0, y % 2) || colour(1, y) != colour(1, y % 2)) {
+      return "a pattern that is not 2x2";
+    }
+  }
+  const int green_x = colour(0, 0) == kGreen ? 0 : 1;
+  const bool bayer = colour(green_x, 0) == kGreen && colour(1 - green_x, 1) == kGreen &&
+                     colour(1 - green_x, 0) + colour(green_x, 1) == kRed + kBlue &&
+                     colour(1 - green_x, 0) != kGreen;
+  return bayer ? "" : "a 2x2 pattern without two greens on a diagonal";
+}
+
+// Black is kept in up to three parts: one for all, one for each colour, and a pattern that repeats
+// over the visible area (DNG).
+float BlackLevel(LibRaw& raw, int x, int y) {
+  const libraw_colordata_t& color = raw.imgdata.color;
+  unsigned black = color.black + color.cblack[raw.COLOR(y, x)];
+  const unsigned rows = color.cblack[4];
+  const unsigned columns = color.cblack[5];
+  if (rows > 0 && columns > 0) {
+    black += color.cblack[6 + (static_cast<unsigned>(y) % rows) * columns +
+                          static_cast<unsigned>(x) % columns];
+  }
+  return static_cast<float>(black);
+}
+
+bool BlackRepeatsLikeBayer(LibRaw& raw) {
+  const libraw_colordata_t& color = raw.imgdata.color;
+  return color.cblack[4] <= 2 && color.cblack[5] <= 2;
+}
+
+std::optional<double> IfPositive(float value) {
+  return value > 0.0F ? std::optional<double>(value) : std::nullopt;
+}
+
+void FillMetadata(const libraw_data_t& data, RawMosaic& mosaic) {
+  mosaic.camera = data.idata.make;
+  if (data.idata.model[0] != '\0') {
+    mosaic.camera += mosaic.camera.empty() ? "" : " ";
+    mosaic.camera += data.idata.model;
+  }
+  mosaic.exposure_s = IfPositive(data.other.shutter);
+  mosaic.f_number = IfPositive(data.other.aperture);
+  mosaic.iso = IfPositive(data.other.iso_speed);
+  const float* gain = data.color.cam_mul;
+  if (gain[0] > 0.0F && gain[1] > 0.0F && gain[2] > 0.0F) {
+    mosaic.camera_white_balance = {gain[0] / gain[1], 1.0F, gain[2] / gain[1]};
+  }
+}
+
+// The visible area as a fraction of the way from black to white.
+void FillSamples(LibRaw& raw, const std::array<float, 4>& black, RawMosaic& mosaic) {
+  const libraw_data_t& data = raw.imgdata;
+  const size_t pitch = data.sizes.raw_pitch / sizeof(data.rawdata.raw_image[0]);
+  mosaic.samples = Image<float>(data.sizes.width, data.sizes.height);
+  for (int y = 0; y < data.sizes.height; ++y) {
+    const auto* row = data.rawdata.raw_image +
+                      pitch * static_cast<size_t>(y + data.sizes.top_margin) +
+                      data.sizes.left_margin;
+    for (int x = 0; x < data.sizes.width; ++x) {
+      const float site_black = black[static_cast<size_t>((y % 2) * 2 + x % 2)];
+      mosaic.samples.At(x, y) =
+          (static_cast<float>(row[x]) - site_black) / (mosaic.white - site_black);
+    }
+  }
+}
+
+Result<RawMosaic> MosaicOf(const std::filesystem::path& path, LibRaw& raw) {
+  const libraw_image_sizes_t& sizes = raw.imgdata.sizes;
+  if (const std::string_view found = NotBayer(raw); !found.empty()) {
+    return Fail(ErrorCode::kBadData, "{}: has {}; needed is a 2x2 Bayer mosaic of integers",
+                path.string(), found);
+  }
+  if (sizes.width < 2 || sizes.height < 2 || sizes.left_margin + sizes.width > sizes.raw_width ||
+      sizes.top_margin + sizes.height > sizes.raw_height) {
+    return Fail(ErrorCode::kBadData,
+                "{}: its visible area {}x{}+{}+{} is not inside its {}x{} sites", path.string(),
+                sizes.width, sizes.height, sizes.left_margin, sizes.top_margin, sizes.raw_width,
+                sizes.raw_height);
+  }
+  if (!BlackRepeatsLikeBayer(raw)) {
+    return Fail(ErrorCode::kBadData, "{}: its black level repeats every {}x{} sites; needed is 2x2",
+                path.string(), raw.imgdata.color.cblack[5], raw.imgdata.color.cblack[4]);
+  }
+  RawMosaic mosaic;
+  mosaic.white = static_cast<float>(raw.imgdata.color.maximum);
+  std::array<float, 4> black = {};
+  for (int site = 0; site < 4; ++site) {
+    const int x = site % 2;
+    const int y = site / 2;
+    mosaic.cfa[static_cast<size_t>(site)] = ColourOf(raw.COLOR(y, x));
+    black[static_cast<size_t>(site)] = BlackLevel(raw, x, y);
+    mosaic.black += black[static_cast<size_t>(site)] / 4.0F;
+  }
+  if (*std::ranges::max_element(black) >= mosaic.white) {
+    return Fail(ErrorCode::kBadData, "{}: its black level {} is not below its white level {}",
+                path.string(), *std::ranges::max_element(black), mosaic.white);
+  }
+  FillMetadata(raw.imgdata, mosaic);
+  FillSamples(raw, black, mosaic);
+  return mosaic;
+}
+
+Result<RawMosaic> ReadUnguarded(const std::filesystem::path& path) {
+  const Result<FileHead> head = ReadFileHead(path);
+  if (!head) {
+    return tl::unexpected(head.error());
+  }
+  if (IsTiffHead(head->bytes)) {
+    if (const Status whole = CheckTiffIsWhole(path); !whole) {
+      return tl::unexpected(whole.error());
+    }
+  }
+  const auto raw = std::make_unique<LibRaw>(LIBRAW_OPTIONS_NONE);  // too large for a stack
+  raw->set_dataerror_handler(nullptr, nullptr);                    // it would print to stderr
+  int status = raw->open_file(path.string().c_str());
+  if (status == LIBRAW_SUCCESS) {
+    status = raw->unpack();
+  }
+  if (const Status decoded = CheckDecoded(path, *raw, status); !decoded) {
+    return tl::unexpected(decoded.error());
+  }
+  return MosaicOf(path, *raw);
+}
+
+// The rows above, at and below a pixel, mirrored at the border; likewise its columns.
+struct Neighbourhood {
+  const float* above;
+  const float* row;
+  const float* below;
+  size_t left;
+  size_t x;
+  size_t right;
+
+  [[nodiscard]] float Horizontal() const { return (row[left] + row[right]) / 2.0F; }
+  [[nodiscard]] float Vertical() const { return (above[x] + below[x]) / 2.0F; }
+  [[nodiscard]] float Cross() const {
+    return ((above[x] + below[x]) + (row[left] + row[right])) / 4.0F;
+  }
+  [[nodiscard]] float Corners() const {
+    return ((above[left] + above[right]) + (below[left] + below[right])) / 4.0F;
+  }
+};
+
+// Of a line of `count`, the place before the first is the second, after the last the last but one.
+size_t Mirrored(int i, int count) {
+  return static_cast<size_t>(i < 0 ? 1 : i >= count ? count - 2 : i);
+}
+
+}  // namespace
+
+bool IsRawName(const std::filesystem::path& path) {
+  constexpr std::array<std::string_view, 24> kEndings = {
+      ".3fr", ".arw", ".cr2", ".cr3", ".crw", ".dcr", ".dng", ".erf",
+      ".iiq", ".kdc", ".mef", ".mos", ".mrw", ".nef", ".nrw", ".orf",
+      ".pef", ".raf", ".rw2", ".rwl", ".sr2", ".srf", ".srw", ".x3f"};
+  std::string ending = path.extension().string();
+  std::ranges::transform(ending, ending.begin(),
+                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return std::ranges::find(kEndings, ending) != kEndings.end();
+}
+
+Result<RawMosaic> ReadRawMosaic(const std::filesystem::path& path) {
+  try {
+    return ReadUnguarded(path);
+  } catch (const std::exception& error) {
+    return Fail(ErrorCode::kBadData, "{}: cannot be decoded as camera RAW: {}", path.string(),
+                error.what());
+  }
+}
+
+Image3 Demosaic(const RawMosaic& mosaic) {
+  const int width = mosaic.samples.width;
+  const int height = mosaic.samples.height;
+  SATEEN_CHECK(width >= 2 && height >= 2);
+  Image3 rgb(mosaic.samples.Size());
+  for (int y = 0; y < height; ++y) {
+    const float* samples = mosaic.samples.pixels.data();
+    const size_t stride = static_cast<size_t>(width);
+    const size_t row = static_cast<size_t>(y) * stride;
+    for (int x = 0; x < width; ++x) {
+      const Neighbourhood near{samples + Mirrored(y - 1, height) * stride,
+                               samples + row,
+                               samples + Mirrored(y + 1, height) * stride,
+                               Mirrored(x - 1, width),
+                               static_cast<size_t>(x),
+                               Mirrored(x + 1, width)};
+      const size_t p = row + near.x;
+      const size_t site = static_cast<size_t>((y % 2) * 2 + x % 2);
+      const uint8_t own = mosaic.cfa[site];
+      rgb[own].pixels[p] = samples[p];
+      if (own == kGreen) {
+        rgb[mosaic.cfa[site ^ 1]].pixels[p] = near.Horizontal();
+        rgb[mosaic.cfa[site ^ 2]].pixels[p] = near.Vertical();
+      } else {
+        rgb[kGreen].pixels[p] = near.Cross();
+        rgb[static_cast<size_t>(kBlue - own)].pixels[p] = near.Corners();
+      }
+    }
+  }
+  return rgb;
+}
+
+}  // namespace sateen

@@ -1,0 +1,196 @@
+#include "scanner/session_layout.h"
+
+#include <algorithm>
+
+#include "core/sha256.h"
+#include "tests/scanner/captures.h"
+
+namespace sateen {
+namespace {
+
+namespace fs = std::filesystem;
+
+using testing::FailureOf;
+using testing::FourLightSession;
+using ::testing::HasSubstr;
+using testing::IsError;
+using ::testing::SizeIs;
+using testing::TempFolder;
+using testing::WriteFlat;
+using testing::WriteText;
+
+class SessionLayout : public ::testing::Test {
+ protected:
+  void Write(const Session& session) { testing::WriteSession(dir_, session); }
+  Capture MustRead(const ReadCaptureOptions& options = {}) {
+    Result<Capture> capture = ReadCapture(dir_, options);
+    EXPECT_TRUE(capture) << capture.error().message;
+    return capture ? *std::move(capture) : Capture{};
+  }
+  static float ValueOf(const LightFrame& frame) { return frame.rgb[0].At(1, 1); }
+
+  TempFolder temp_;
+  fs::path dir_ = temp_.Path() / "linen-07";
+};
+
+TEST_F(SessionLayout, SubtractsTheDarkFrameAndKeepsTheRecord) {
+  Write(FourLightSession());
+  const Capture capture = MustRead();
+  EXPECT_EQ(capture.layout, "session");
+  ASSERT_THAT(capture.stack, SizeIs(4));
+  for (size_t k = 0; k < 4; ++k) {
+    EXPECT_FLOAT_EQ(ValueOf(capture.stack[k]), 0.1F * static_cast<float>(k + 1) - 0.05F);
+  }
+  EXPECT_EQ(capture.rig.lights[3].name, "south");
+  ASSERT_TRUE(capture.session);
+  EXPECT_THAT(capture.session->frames, SizeIs(5));
+}
+
+TEST_F(SessionLayout, FollowsTheOrderOfTheRigNotOfTheFrames) {
+  Session session = FourLightSession();
+  std::reverse(session.frames.begin(), session.frames.end());
+  Write(session);
+  const Capture capture = MustRead();
+  EXPECT_FLOAT_EQ(ValueOf(capture.stack[0]), 0.05F);
+  EXPECT_THAT(capture.stack[0].name, HasSubstr("east.exr"));
+}
+
+TEST_F(SessionLayout, DividesByExposureBeforeTheDarkFrameIsSubtracted) {
+  Session session = FourLightSession();
+  for (SessionFrame& frame : session.frames) {
+    frame.exposure_s = frame.role == FrameRole::kDark ? 0.25 : 0.5;
+    frame.f_number = 2;
+    frame.iso = frame.light == "west" ? 400 : 200;
+  }
+  Write(session);
+  const Capture capture = MustRead();
+  // H: east 0.5 * 2 / 4 = 0.25, west 0.5, dark 0.25 * 2 / 4 = 0.125.
+  EXPECT_FLOAT_EQ(ValueOf(capture.stack[0]), 0.1F / 0.25F - 0.05F / 0.125F);
+  EXPECT_FLOAT_EQ(ValueOf(capture.stack[1]), 0.2F / 0.5F - 0.05F / 0.125F);
+}
+
+TEST_F(SessionLayout, SubtractsTheMeanOfSeveralDarkFrames) {
+  Session session = FourLightSession();
+  session.frames.push_back(session.frames.back());
+  session.frames.back().file = "frames/dark2.exr";
+  Write(session);
+  WriteFlat(dir_ / "frames/dark2.exr", 0.07F);
+  EXPECT_FLOAT_EQ(ValueOf(MustRead().stack[0]), 0.1F - 0.06F);
+}
+
+TEST_F(SessionLayout, FullScaleIsRadianceAndSaturatedSamplesStayThere) {
+  Session session = FourLightSession();
+  session.frames[0].file = "frames/east.png";
+  for (SessionFrame& frame : session.frames) {
+    frame.exposure_s = 0.5;
+  }
+  Write(session);
+  Image<uint16_t> plane(testing::kSize, 32768);
+  plane.At(1, 1) = 65535;
+  ASSERT_TRUE(WritePng16(dir_ / "frames/east.png", {plane, plane, plane}));
+  const Capture capture = MustRead();
+  EXPECT_FLOAT_EQ(capture.stack[0].full_scale, 2.0F);
+  EXPECT_EQ(ValueOf(capture.stack[0]), capture.stack[0].full_scale);
+  EXPECT_NEAR(capture.stack[0].rgb[0].At(0, 0), 1.0F - 0.1F, 2e-5F);  // 32768 / 65535 is not 1/2
+  EXPECT_TRUE(std::isinf(capture.stack[1].full_scale));
+}
+
+TEST_F(SessionLayout, VerifiesHashesWhereTheyAreRecorded) {
+  Session session = FourLightSession();
+  Write(session);
+  session.frames[2].sha256 = Sha256OfFile(dir_ / "frames/north.exr").value();
+  session.frames[4].sha256 = Sha256OfFile(dir_ / "frames/dark.exr").value();
+  session.rig_sha256 = Sha256OfFile(temp_.Path() / "rig.json").value();
+  Write(session);
+  MustRead();
+  WriteFlat(dir_ / "frames/north.exr", 0.31F);
+  EXPECT_THAT(FailureOf(dir_), IsError(ErrorCode::kBadData, "frames/north.exr: its SHA-256 is"));
+  WriteFlat(dir_ / "frames/north.exr", 0.3F);
+  WriteFlat(dir_ / "frames/dark.exr", 0.06F);
+  EXPECT_THAT(FailureOf(dir_), IsError(ErrorCode::kBadData, "frames/dark.exr: its SHA-256 is"));
+}
+
+TEST_F(SessionLayout, RefusesARigThatHasChanged) {
+  Session session = FourLightSession();
+  session.rig_sha256 = std::string(64, 'a');
+  Write(session);
+  EXPECT_THAT(FailureOf(dir_),
+              IsError(ErrorCode::kBadData, "the rig has changed since the capture"));
+  MustRead({.rig_file = temp_.Path() / "rig.json"});  // one that the caller vouches for
+}
+
+TEST_F(SessionLayout, NamesTheLightWithoutAFrameUnlessItIsNotUsed) {
+  Session session = FourLightSession();
+  session.frames.erase(session.frames.begin() + 2);
+  Write(session);
+  EXPECT_THAT(FailureOf(dir_), IsError(ErrorCode::kBadData, "no lit frame of light 'north'"));
+  EXPECT_THAT(MustRead({.lights = {3, 0}}).stack, SizeIs(2));
+}
+
+TEST_F(SessionLayout, RefusesTwoFramesOfALight) {
+  Session session = FourLightSession();
+  session.frames[2].light = "east";
+  Write(session);
+  EXPECT_THAT(FailureOf(dir_), IsError(ErrorCode::kBadData,
+                                       "frames frames/east.exr and frames/north.exr are both of "
+                                       "light 'east'"));
+}
+
+TEST_F(SessionLayout, RefusesALightThatTheRigHasNot) {
+  Session session = FourLightSession();
+  session.frames[2].light = "up";
+  Write(session);
+  EXPECT_THAT(FailureOf(dir_), IsError(ErrorCode::kBadData,
+                                       "of light 'up', which the rig has not; its lights are east, "
+                                       "west, north, south"));
+}
+
+TEST_F(SessionLayout, MatchesAnotherRigByTheNamesOfItsLights) {
+  Write(FourLightSession());
+  Rig rig = testing::FourLights();
+  std::reverse(rig.lights.begin(), rig.lights.end());
+  WriteText(temp_.Path() / "new.json", RigToJson(rig));
+  fs::remove(temp_.Path() / "rig.json");  // not needed then
+  const Capture capture = MustRead({.rig_file = temp_.Path() / "new.json"});
+  EXPECT_EQ(capture.rig.lights[0].name, "south");
+  EXPECT_FLOAT_EQ(ValueOf(capture.stack[0]), 0.4F - 0.05F);
+}
+
+TEST_F(SessionLayout, ReadsMaskAndTruth) {
+  Session session = FourLightSession();
+  session.mask = "area.png";
+  Write(session);
+  testing::WriteMask(dir_ / "area.png");
+  fs::create_directory(dir_ / "truth");
+  ASSERT_TRUE(WriteExr(dir_ / "truth/normal.exr", testing::LevelNormals()));
+  WriteFlat(dir_ / "truth/albedo.exr", 0.5F);
+  const Capture capture = MustRead();
+  EXPECT_TRUE(capture.mask);
+  ASSERT_TRUE(capture.truth);
+  ASSERT_TRUE(capture.truth->albedo);
+  EXPECT_EQ((*capture.truth->albedo)[2].At(0, 0), 0.5F);
+  EXPECT_THAT(capture.sha256_of_input, SizeIs(10));  // record, rig, 4 + 1 frames, mask, 2 truths
+}
+
+TEST_F(SessionLayout, RefusesADarkFrameOfAnotherSize) {
+  Write(FourLightSession());
+  WriteFlat(dir_ / "frames/dark.exr", 0.05F, {5, 3});
+  EXPECT_THAT(FailureOf(dir_), IsError(ErrorCode::kBadData, "dark.exr: is 5 x 3 px"));
+}
+
+TEST_F(SessionLayout, RefusesFramesThatAreNotOfTheCamera) {
+  Rig rig = testing::FourLights();
+  rig.camera = OverheadCamera({8, 6}, 500.0, 200.0);
+  Write(FourLightSession());
+  WriteText(temp_.Path() / "rig.json", RigToJson(rig));
+  EXPECT_THAT(FailureOf(dir_), IsError(ErrorCode::kBadData, "the rig's camera has 8 x 6 px"));
+}
+
+TEST_F(SessionLayout, SaysThatTheRigIsAbsent) {
+  Write(FourLightSession());
+  fs::remove(temp_.Path() / "rig.json");
+  EXPECT_THAT(FailureOf(dir_), IsError(ErrorCode::kIo, "rig.json"));
+}
+
+}  // namespace
+}  // namespace sateen
