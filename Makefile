@@ -37,9 +37,9 @@ format: setup  ## Format all sources in place
 format-check: setup  ## Fail where a source is not formatted
 	@$(OUR_SOURCES) | xargs -0r clang-format --dry-run -Werror
 
-tidy: setup  ## clang-tidy over all sources that build/release compiles
-	@cmake --preset $(PRESET) --log-level=WARNING
-	@tools/tidy build/release $(JOBS)
+tidy: setup  ## clang-tidy over the libraries and the program
+	@cmake --preset tidy --log-level=WARNING
+	@tools/tidy build/tidy $(JOBS)
 
 asan: setup  ## All tests under the address and undefined-behaviour sanitizers
 	@cmake --preset asan --log-level=WARNING

@@ -29,8 +29,8 @@ struct Style {
   std::string_view color;
 };
 
-constexpr std::array<Style, 3> kCases = {
-    {{"clean", "#1b7837"}, {"noisy", "#2166ac"}, {"hard", "#b2182b"}}};
+constexpr std::array<Style, 4> kCases = {
+    {{"clean", "#1b7837"}, {"noisy", "#2166ac"}, {"hard", "#b2182b"}, {"subnormal", "#762a83"}}};
 
 std::string ColorOf(std::string_view case_name) {
   const auto* found = std::find_if(kCases.begin(), kCases.end(),
@@ -122,12 +122,12 @@ std::string TextReport(const BenchReport& report) {
                         floor.threads, floor.threads == 1 ? " " : "s", floor.ns_per_pixel,
                         floor.gb_per_s);
   }
-  text += fmt::format("{:<6} {:<10} {:>7} {:>9} {:>10} {:>7} {:>8} {:>10} {:>10} {:>10} {:>10}\n",
+  text += fmt::format("{:<9} {:<10} {:>7} {:>9} {:>10} {:>7} {:>8} {:>10} {:>10} {:>10} {:>10}\n",
                       "case", "backend", "threads", "ns/px", "x jacobi", "x floor", "solved %",
                       "mean deg", "p99 deg", "max deg", "albedo %");
   for (const BenchRow& row : report.rows) {
     text += fmt::format(
-        "{:<6} {:<10} {:>7} {:>9.2f} {:>10.1f} {:>7.1f} {:>8.2f} {:>10.3g} {:>10.3g} {:>10.3g} "
+        "{:<9} {:<10} {:>7} {:>9.2f} {:>10.1f} {:>7.1f} {:>8.2f} {:>10.3g} {:>10.3g} {:>10.3g} "
         "{:>10.3g}\n",
         row.case_name, Name(row.backend), row.threads, row.ns_per_pixel, row.times_jacobi_svd,
         row.times_floor, 100.0 * row.solved_fraction, row.angular_error_deg.mean,

@@ -19,6 +19,7 @@ namespace sateen::cli {
 namespace {
 
 constexpr double kRadPerDeg = std::numbers::pi / 180.0;
+constexpr float kSubnormal = 1e-40F;
 constexpr std::array kBackends = {Backend::kJacobiSvd, Backend::kQr, Backend::kLdlt, Backend::kFast,
                                   Backend::kAuto};
 
@@ -29,7 +30,8 @@ struct BenchCase {
 };
 
 // Ten near lights each. Clean has exact radiance; noisy a 14-bit sensor; hard adds slopes to 75
-// degrees, saturated highlights and lights huddled 20 degrees around the zenith.
+// degrees, saturated highlights and lights huddled 20 degrees around the zenith; subnormal is clean
+// at 1e-40 of its radiance.
 Result<std::vector<BenchCase>> RenderCases(ImageSize size, const Task& task) {
   const Rig rig = RingRig(size);
   Rig huddled = rig;
@@ -52,6 +54,17 @@ Result<std::vector<BenchCase>> RenderCases(ImageSize size, const Task& task) {
       return tl::unexpected(rendered.error());
     }
     cases[i].rendered = std::move(*rendered);
+  }
+  cases.push_back({"subnormal", rig, cases[0].rendered});
+  for (LightFrame& frame : cases.back().rendered.stack) {
+    for (Image<float>& plane : frame.rgb.planes) {
+      std::transform(plane.pixels.begin(), plane.pixels.end(), plane.pixels.begin(),
+                     [](float value) { return value * kSubnormal; });
+    }
+  }
+  for (Image<float>& plane : cases.back().rendered.albedo.planes) {
+    std::transform(plane.pixels.begin(), plane.pixels.end(), plane.pixels.begin(),
+                   [](float value) { return value * kSubnormal; });
   }
   return cases;
 }

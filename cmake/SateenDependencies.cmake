@@ -40,3 +40,8 @@ sateen_find_pkg_config(OpenImageIO OpenImageIO>=2.4)
 if(NOT TARGET OpenImageIO::OpenImageIO)
   add_library(OpenImageIO::OpenImageIO ALIAS PkgConfig::OpenImageIO)
 endif()
+
+# What the program uses and the libraries do not.
+if(NOT "${CMAKE_FIND_PACKAGE_NAME}" STREQUAL "sateen")
+  find_package(CLI11 2.1 REQUIRED)
+endif()

@@ -36,7 +36,9 @@ function(sateen_install_module name)
 endfunction()
 
 function(sateen_set_warnings target)
-  target_compile_options(${target} PRIVATE -Wall -Wextra -Wshadow -Wconversion -Wdouble-promotion)
+  target_compile_options(${target} PRIVATE -Wall -Wextra -Wshadow -Wconversion -Wdouble-promotion
+    # Options are given by name, and what is not named keeps its default.
+    -Wno-missing-field-initializers)
   if(SATEEN_WARNINGS_AS_ERRORS)
     target_compile_options(${target} PRIVATE -Werror)
   endif()

@@ -1,9 +1,12 @@
 #include "imaging/file_check.h"
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cstring>
 #include <fstream>
+#include <iterator>
+#include <map>
 #include <optional>
 #include <set>
 #include <system_error>
@@ -56,7 +59,26 @@ class FileProbe {
   bool big_endian_ = true;
 };
 
-// Walks the directories of a TIFF file and notes where its strips and tiles end.
+// Bytes of one value of each TIFF type (TIFF 6.0, section 2; 13 IFD is of a later supplement).
+constexpr std::array<uint64_t, 14> kValueBytes = {0, 1, 1, 2, 4, 8, 1, 1, 2, 4, 8, 4, 8, 4};
+
+enum Tag : uint32_t {
+  kImageWidth = 256,
+  kImageLength = 257,
+  kStripOffsets = 273,
+  kStripByteCounts = 279,
+  kTileWidth = 322,
+  kTileLength = 323,
+  kTileOffsets = 324,
+  kTileByteCounts = 325,
+  kSubDirectories = 330  // where DNG and NEF keep the full-size image
+};
+
+constexpr std::array<uint32_t, 9> kWalked = {kImageWidth,      kImageLength,    kStripOffsets,
+                                             kStripByteCounts, kTileWidth,      kTileLength,
+                                             kTileOffsets,     kTileByteCounts, kSubDirectories};
+
+// Walks the directories of a TIFF file. The probe learns where their values, strips and tiles end.
 class TiffWalk {
  public:
   explicit TiffWalk(FileProbe& probe) : probe_(probe) {}
@@ -71,54 +93,63 @@ class TiffWalk {
       }
     }
   }
+  // Tiles that the directories do not list.
+  [[nodiscard]] uint64_t MissingTiles() const { return missing_tiles_; }
 
  private:
   static constexpr size_t kMaxDirectories = 64;
-  static constexpr uint32_t kMaxPieces = 1U << 20;
+  static constexpr uint64_t kMaxValues = 1U << 20;
+  using Fields = std::map<uint32_t, std::vector<uint32_t>>;
 
   void VisitDirectory(uint64_t offset) {
     const uint32_t entries = probe_.Read(offset, 2).value_or(0);
-    std::vector<uint32_t> starts;
-    std::vector<uint32_t> lengths;
+    Fields fields;
     for (uint32_t i = 0; i < entries; ++i) {
       const uint64_t entry = offset + 2 + uint64_t{12} * i;
-      switch (probe_.Read(entry, 2).value_or(0)) {
-        case 273:  // StripOffsets
-        case 324:  // TileOffsets
-          starts = Values(entry);
-          break;
-        case 279:  // StripByteCounts
-        case 325:  // TileByteCounts
-          lengths = Values(entry);
-          break;
-        case 330:  // SubIFDs, where DNG and NEF keep the full-size image
-          for (const uint32_t child : Values(entry)) {
-            pending_.push_back(child);
-          }
-          break;
-        default:
-          break;
-      }
+      const uint32_t tag = probe_.Read(entry, 2).value_or(0);
+      fields[tag] = Values(entry, std::ranges::find(kWalked, tag) != kWalked.end());
     }
-    for (size_t i = 0; i < std::min(starts.size(), lengths.size()); ++i) {
-      probe_.Need(starts[i], lengths[i]);
-    }
+    NeedPieces(fields[kStripOffsets], fields[kStripByteCounts]);
+    NeedPieces(fields[kTileOffsets], fields[kTileByteCounts]);
+    CountTiles(fields);
+    std::ranges::copy(fields[kSubDirectories], std::back_inserter(pending_));
     pending_.push_back(probe_.Read(offset + 2 + uint64_t{12} * entries, 4).value_or(0));
   }
 
-  // The entry's values where they are SHORT, LONG or IFD: in the entry itself if they fit.
-  std::vector<uint32_t> Values(uint64_t entry) {
-    const uint32_t type = probe_.Read(entry + 2, 2).value_or(0);
-    const uint32_t count = probe_.Read(entry + 4, 4).value_or(0);
-    if ((type != 3 && type != 4 && type != 13) || count > kMaxPieces) {
-      return {};
+  void NeedPieces(const std::vector<uint32_t>& starts, const std::vector<uint32_t>& lengths) {
+    for (size_t i = 0; i < std::min(starts.size(), lengths.size()); ++i) {
+      probe_.Need(starts[i], lengths[i]);
     }
-    const size_t width = type == 3 ? 2 : 4;
-    const uint64_t place =
-        count * width <= 4 ? entry + 8 : uint64_t{probe_.Read(entry + 8, 4).value_or(0)};
+  }
+
+  void CountTiles(Fields& fields) {
+    const auto first = [&fields](Tag tag) -> uint64_t {
+      return fields[tag].empty() ? 0 : fields[tag].front();
+    };
+    if (first(kTileWidth) == 0 || first(kTileLength) == 0) {
+      return;
+    }
+    const uint64_t columns = (first(kImageWidth) + first(kTileWidth) - 1) / first(kTileWidth);
+    const uint64_t rows = (first(kImageLength) + first(kTileLength) - 1) / first(kTileLength);
+    missing_tiles_ += std::max<uint64_t>(columns * rows, fields[kTileOffsets].size()) -
+                      fields[kTileOffsets].size();
+  }
+
+  // The entry's values where they are `wanted` and SHORT, LONG or IFD. They are in the entry itself
+  // if they fit.
+  std::vector<uint32_t> Values(uint64_t entry, bool wanted) {
+    const uint32_t type = probe_.Read(entry + 2, 2).value_or(0);
+    const uint64_t count = probe_.Read(entry + 4, 4).value_or(0);
+    const uint64_t width = type < kValueBytes.size() ? kValueBytes[type] : 0;
+    uint64_t place = entry + 8;
+    if (count * width > 4) {
+      place = probe_.Read(entry + 8, 4).value_or(0);
+      probe_.Need(place, count * width);
+    }
     std::vector<uint32_t> values;
-    for (uint32_t i = 0; i < count; ++i) {
-      const std::optional<uint32_t> value = probe_.Read(place + uint64_t{width} * i, width);
+    const bool is_number = type == 3 || type == 4 || type == 13;
+    for (uint64_t i = 0; wanted && is_number && i < std::min(count, kMaxValues); ++i) {
+      const std::optional<uint32_t> value = probe_.Read(place + width * i, width);
       if (!value) {
         break;
       }
@@ -130,6 +161,7 @@ class TiffWalk {
   FileProbe& probe_;
   std::vector<uint32_t> pending_;
   std::set<uint32_t> visited_;
+  uint64_t missing_tiles_ = 0;
 };
 
 }  // namespace
@@ -193,7 +225,13 @@ Status CheckTiffIsWhole(const std::filesystem::path& path) {
   }
   FileProbe probe(path, head->file_bytes);
   probe.SetBigEndian(head->bytes.starts_with("MM"));
-  TiffWalk(probe).Run();
+  TiffWalk walk(probe);
+  walk.Run();
+  if (walk.MissingTiles() > 0) {
+    return Fail(ErrorCode::kBadData,
+                "{}: is damaged: {} tiles of its picture are not in its directory; copy it again",
+                path.string(), walk.MissingTiles());
+  }
   if (probe.NeededBytes() > head->file_bytes) {
     return CutShort(path, head->file_bytes, probe.NeededBytes());
   }

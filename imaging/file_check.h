@@ -25,7 +25,8 @@ struct FileHead {
 
 // kBadData unless the chunks of the PNG reach to its end mark.
 [[nodiscard]] Status CheckPngIsWhole(const std::filesystem::path& path);
-// kBadData unless every directory, strip and tile of the TIFF lies inside the file.
+// kBadData unless every value, strip and tile of the TIFF's directories lies inside the file, and
+// the directories list as many tiles as their pictures have.
 [[nodiscard]] Status CheckTiffIsWhole(const std::filesystem::path& path);
 
 }  // namespace sateen

@@ -228,6 +228,10 @@ Status Rig::Validate(std::string_view what) const {
   if (status && response) {
     status = CheckResponse(*response, what);
   }
+  if (status && !calibration_json.empty() &&
+      !Json::parse(calibration_json, nullptr, /*allow_exceptions=*/false).is_object()) {
+    return Fail(ErrorCode::kBadData, "{}: calibration is not a JSON object; need one", what);
+  }
   return status.and_then([&] { return CheckLights(lights, camera.has_value(), what); });
 }
 

@@ -31,7 +31,13 @@ struct Rig {
   [[nodiscard]] Status Validate(std::string_view what) const;
 };
 
+// Errors   kIo: the file is absent or unreadable
+//          kBadData: not schema sateen.rig/1; a key that is missing, unknown, out of range or not
+//          of the light's model; a light that is not above the table
+// Directions, axes and the camera's rotation, which files round, come back exactly normalised.
 [[nodiscard]] Result<Rig> ReadRig(const std::filesystem::path& path);
+
+// The text of a valid rig's file, one line a light. Reading it gives the same rig to the last bit.
 [[nodiscard]] std::string RigToJson(const Rig& rig);
 
 }  // namespace sateen

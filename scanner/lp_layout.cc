@@ -1,7 +1,6 @@
 #include "scanner/lp_layout.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "scanner/light_table.h"
 #include "scanner/text_table.h"
@@ -76,7 +75,7 @@ Status CheckCount(const std::vector<TextLine>& lines, const fs::path& lp_file) {
 // Lamps at a finite distance are read as if they were far away: the unit is not in the file.
 void WarnOfPositions(const std::vector<NumberRow>& rows, CapturePlan& plan) {
   const auto is_position = [](const NumberRow& row) {
-    const double length = std::hypot(row.values[0], row.values[1], row.values[2]);
+    const double length = Eigen::Vector3d(row.values[0], row.values[1], row.values[2]).norm();
     return length < kUnitLengths.least || length > kUnitLengths.most;
   };
   const auto count = std::count_if(rows.begin(), rows.end(), is_position);

@@ -208,7 +208,8 @@ std::string SessionToJson(const Session& session) {
     json["table_from_sheet"] = std::vector<double>(matrix.data(), matrix.data() + matrix.size());
   }
   PutIfKnown(json, "mask", session.mask);
-  return json.dump(2) + "\n";
+  // A file name that is not UTF-8 must not end the run; reading will say that it is not there.
+  return json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
 }
 
 }  // namespace sateen

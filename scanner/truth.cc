@@ -2,6 +2,7 @@
 
 #include <matio.h>
 
+#include <Eigen/Core>
 #include <cmath>
 #include <cstdint>
 #include <memory>
@@ -98,9 +99,9 @@ Result<Image3> ReadMatNormals(const fs::path& path) {
 Status CheckNormals(const Image3& normal, const fs::path& path) {
   for (int y = 0; y < normal.Size().height; ++y) {
     for (int x = 0; x < normal.Size().width; ++x) {
-      const double length = std::hypot(static_cast<double>(normal[0].At(x, y)),
-                                       static_cast<double>(normal[1].At(x, y)),
-                                       static_cast<double>(normal[2].At(x, y)));
+      // Not std::hypot: with three arguments, libstdc++'s can make 0 of a NaN.
+      const double length =
+          Eigen::Vector3d(normal[0].At(x, y), normal[1].At(x, y), normal[2].At(x, y)).norm();
       if (length != 0.0 && !(std::abs(length - 1.0) <= kUnitTolerance)) {
         return Fail(ErrorCode::kBadData,
                     "{}: the normal at column {}, row {} has length {:.6g}; need 1, or 0 where it "

@@ -87,10 +87,6 @@ Status CheckInputs(const LightStack& stack, const Rig& rig, const std::optional<
   if (AllDistant(rig.lights)) {
     return CheckDirections(rig.lights, options.max_condition);
   }
-  if (!rig.camera) {
-    return Fail(ErrorCode::kBadData,
-                "the rig has no camera, but near lights need one to place pixels on the table");
-  }
   const ImageSize size = stack[0].rgb.Size();
   if (rig.camera->size_px != size) {
     return Fail(ErrorCode::kBadData, "the rig's camera has {}x{} px but the frames are {}x{} px",

@@ -3,136 +3,26 @@
 #include <OpenImageIO/imageio.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <sys/resource.h>
 
-#include <algorithm>
 #include <cmath>
-#include <csignal>
-#include <fstream>
-#include <iterator>
-#include <limits>
 #include <string>
 #include <vector>
 
 #include "imaging/color.h"
+#include "tests/imaging/pictures.h"
 #include "tests/testing/files.h"
 
 namespace sateen {
 namespace {
 
 using ::testing::HasSubstr;
+using testing::SameBits;
+using testing::Sample;
 using testing::TempFolder;
+using testing::TestImage;
+using testing::WriteKind;
 using testing::WriteText;
-
-// A picture that no coder packs to nothing, different in every channel.
-float Sample(int x, int y, int channel) {
-  return 0.5F + 0.45F * std::sin(0.13F * static_cast<float>(x * (channel + 1)) +
-                                 0.21F * static_cast<float>(y) * static_cast<float>(x % 7));
-}
-
-struct FileKind {
-  const char* name;
-  OIIO::TypeDesc type;
-  int channels = 3;
-  const char* compression = nullptr;
-  int tile_px = 0;
-};
-
-// Writes with OpenImageIO itself, for the kinds of file that our own writers do not make.
-void WriteWithOiio(const std::filesystem::path& path, OIIO::ImageSpec spec,
-                   const std::vector<float>& samples) {
-  const auto output = OIIO::ImageOutput::create(path.string());
-  ASSERT_TRUE(output) << OIIO::geterror();
-  ASSERT_TRUE(output->open(path.string(), spec)) << output->geterror();
-  ASSERT_TRUE(output->write_image(OIIO::TypeFloat, samples.data())) << output->geterror();
-  ASSERT_TRUE(output->close()) << output->geterror();
-}
-
-void WriteKind(const std::filesystem::path& path, const FileKind& kind) {
-  OIIO::ImageSpec spec(97, 61, kind.channels, kind.type);
-  spec.tile_width = spec.tile_height = kind.tile_px;
-  if (kind.compression != nullptr) {
-    spec.attribute("compression", kind.compression);
-  }
-  std::vector<float> samples;
-  for (int y = 0; y < spec.height; ++y) {
-    for (int x = 0; x < spec.width; ++x) {
-      for (int c = 0; c < kind.channels; ++c) {
-        samples.push_back(Sample(x, y, c));
-      }
-    }
-  }
-  WriteWithOiio(path, spec, samples);
-}
-
-std::string ReadBytes(const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
-}
-
-bool SameBits(const Image3& a, const Image3& b) {
-  return a.Size() == b.Size() && a[0].pixels == b[0].pixels && a[1].pixels == b[1].pixels &&
-         a[2].pixels == b[2].pixels;
-}
-
-Image3 TestImage() {
-  Image3 image(ImageSize{23, 17});
-  for (size_t c = 0; c < 3; ++c) {
-    for (int y = 0; y < 17; ++y) {
-      for (int x = 0; x < 23; ++x) {
-        image[c].At(x, y) = Sample(x, y, static_cast<int>(c)) * 2.0F - 1.0F;
-      }
-    }
-  }
-  return image;
-}
-
-TEST(WriteExr, KeepsEveryFloatAndItsPlace) {
-  const TempFolder folder;
-  Image3 image = TestImage();
-  image[0].At(0, 0) = std::numeric_limits<float>::infinity();
-  image[1].At(22, 0) = std::numeric_limits<float>::denorm_min();
-  image[2].At(0, 16) = -1e30F;
-  ASSERT_TRUE(WriteExr(folder.Path() / "normal.exr", image));
-
-  const Result<Image3> back = ReadImage3(folder.Path() / "normal.exr");
-  ASSERT_TRUE(back) << back.error().message;
-  EXPECT_TRUE(SameBits(*back, image));
-  const Result<Photo> photo = ReadPhoto(folder.Path() / "normal.exr");
-  ASSERT_TRUE(photo) << photo.error().message;
-  EXPECT_TRUE(SameBits(photo->rgb, image));
-  EXPECT_FALSE(photo->saturation.has_value());
-  EXPECT_FALSE(photo->was_srgb);
-}
-
-TEST(WriteExr, GivesThreePlanesTheNamesRgbAndZip) {
-  const TempFolder folder;
-  ASSERT_TRUE(WriteExr(folder.Path() / "normal.exr", TestImage()));
-  const auto input = OIIO::ImageInput::open((folder.Path() / "normal.exr").string());
-  ASSERT_TRUE(input);
-  EXPECT_THAT(input->spec().channelnames, ::testing::ElementsAre("R", "G", "B"));
-  EXPECT_EQ(input->spec().format, OIIO::TypeFloat);
-  EXPECT_EQ(input->spec().get_string_attribute("compression"), "zip");
-}
-
-TEST(WriteExr, GivesTheSameBytesAtAnyTime) {
-  const TempFolder folder;
-  ASSERT_TRUE(WriteExr(folder.Path() / "a.exr", TestImage()));
-  const std::string bytes = ReadBytes(folder.Path() / "a.exr");
-  // OpenImageIO would put the time of day into capDate, 19 characters like "2024:05:06 07:08:09".
-  EXPECT_EQ(bytes.find("capDate"), bytes.find(std::string("capDate\0string\0\0\0\0\0", 19)));
-}
-
-TEST(WriteExr, GreyReadsAsThreeEqualPlanes) {
-  const TempFolder folder;
-  const Image<float> plane = TestImage()[1];
-  ASSERT_TRUE(WriteExr(folder.Path() / "residual.exr", plane));
-  const Result<Photo> photo = ReadPhoto(folder.Path() / "residual.exr");
-  ASSERT_TRUE(photo) << photo.error().message;
-  for (size_t c = 0; c < 3; ++c) {
-    EXPECT_EQ(photo->rgb[c].pixels, plane.pixels);
-  }
-}
+using testing::WriteWithOiio;
 
 TEST(ReadPhoto, UndoesSrgbOf8BitFilesOnly) {
   const TempFolder folder;
@@ -168,24 +58,6 @@ TEST(ReadPhoto, UndoesSrgbOf8BitFilesOnly) {
   EXPECT_EQ(auto8.saturation, 1.0F);
   EXPECT_EQ(auto16.saturation, 1.0F);
   EXPECT_EQ(auto8.rgb[0].At(255, 0), 1.0F);  // saturated samples compare equal to `saturation`
-}
-
-TEST(WritePng8, KeepsThePlanesApartAndInPlace) {
-  const TempFolder folder;
-  std::array<Image<uint8_t>, 3> image;
-  for (size_t c = 0; c < 3; ++c) {
-    image[c] = Image<uint8_t>(5, 3);
-    for (size_t p = 0; p < 15; ++p) {
-      image[c].pixels[p] = static_cast<uint8_t>(p * 10 + c);
-    }
-  }
-  ASSERT_TRUE(WritePng8(folder.Path() / "rgb.png", image));
-  const Photo photo = ReadPhoto(folder.Path() / "rgb.png", Encoding::kLinear).value();
-  for (size_t c = 0; c < 3; ++c) {
-    for (size_t p = 0; p < 15; ++p) {
-      EXPECT_EQ(photo.rgb[c].pixels[p], static_cast<float>(p * 10 + c) / 255.0F);
-    }
-  }
 }
 
 TEST(ReadPhoto, TurnsBottomUpTgaTheRightWay) {
@@ -259,86 +131,6 @@ TEST(ReadPhoto, ReadsHalfDoubleAndJpeg) {
   EXPECT_TRUE(jpeg.was_srgb);
 }
 
-TEST(ReadPhoto, RefusesFilesCutShortAtAnyLength) {
-  const FileKind kinds[] = {
-      {"none.exr", OIIO::TypeFloat, 3, "none"},
-      {"zip.exr", OIIO::TypeFloat, 3, "zip"},
-      {"piz.exr", OIIO::TypeHalf, 3, "piz"},
-      {"tiled.exr", OIIO::TypeFloat, 3, "zip", 16},
-      {"8.png", OIIO::TypeUInt8},
-      {"16.png", OIIO::TypeUInt16},
-      {"grey.png", OIIO::TypeUInt8, 1},
-      {"none.tif", OIIO::TypeUInt16, 3, "none"},
-      {"zip.tif", OIIO::TypeUInt8, 3, "zip"},
-      {"lzw.tif", OIIO::TypeUInt8, 3, "lzw"},
-      {"float.tif", OIIO::TypeFloat, 3, "none"},
-      {"tiled.tif", OIIO::TypeUInt8, 3, "zip", 16},
-      {"rgb.jpg", OIIO::TypeUInt8},
-      {"grey.jpg", OIIO::TypeUInt8, 1},
-  };
-  for (const FileKind& kind : kinds) {
-    const TempFolder folder;
-    const std::filesystem::path path = folder.Path() / kind.name;
-    WriteKind(path, kind);
-    ASSERT_TRUE(ReadPhoto(path)) << kind.name;
-    const std::uintmax_t whole = std::filesystem::file_size(path);
-    // From the end down: every length near the end and near the start, samples between.
-    std::uintmax_t kept = whole;
-    while (kept > 0) {
-      const bool near_an_end = kept < 40 || whole - kept < 40;
-      kept -= near_an_end ? 1 : std::min<std::uintmax_t>(kept, 1 + whole / 97);
-      testing::CutShort(path, kept);
-      const Result<Photo> photo = ReadPhoto(path);
-      ASSERT_FALSE(photo) << kind.name << " cut to " << kept << " of " << whole;
-      ASSERT_EQ(photo.error().code, ErrorCode::kBadData);
-      ASSERT_THAT(photo.error().message, HasSubstr(path.string()));
-    }
-  }
-}
-
-TEST(ReadPhoto, TgaCutShortFailsOrHasAllItsPixels) {
-  for (const char* compression : {"none", "rle"}) {
-    const TempFolder folder;
-    const std::filesystem::path path = folder.Path() / "a.tga";
-    WriteKind(path, {"", OIIO::TypeUInt8, 3, compression});
-    const Photo whole = ReadPhoto(path).value();
-    const std::uintmax_t whole_bytes = std::filesystem::file_size(path);
-    int refused = 0;
-    int complete = 0;
-    for (std::uintmax_t kept = whole_bytes - 1; kept > 0;
-         kept -= std::min<std::uintmax_t>(kept, 41)) {
-      testing::CutShort(path, kept);
-      const Result<Photo> photo = ReadPhoto(path);
-      (photo ? complete : refused) += 1;
-      // TGA has no end mark, only an optional footer (521 bytes here) after the pixels.
-      ASSERT_TRUE(!photo || (whole_bytes - kept < 530 && SameBits(photo->rgb, whole.rgb))) << kept;
-    }
-    EXPECT_GT(complete, 5);
-    EXPECT_GT(refused, 100);
-  }
-}
-
-TEST(ReadPhoto, TellsAbsentFromUnreadableFromBad) {
-  const TempFolder folder;
-  const Result<Photo> absent = ReadPhoto(folder.Path() / "absent.png");
-  ASSERT_FALSE(absent);
-  EXPECT_EQ(absent.error().code, ErrorCode::kIo);
-  EXPECT_THAT(absent.error().message, HasSubstr("absent.png: no such file"));
-  const Result<Photo> folder_itself = ReadPhoto(folder.Path());
-  ASSERT_FALSE(folder_itself);
-  EXPECT_EQ(folder_itself.error().code, ErrorCode::kIo);
-
-  WriteText(folder.Path() / "empty.png", "");
-  WriteText(folder.Path() / "text.png", "this is not a picture, whatever its name says");
-  WriteText(folder.Path() / "text.tga", "this is not a picture, whatever its name says");
-  for (const char* name : {"empty.png", "text.png", "text.tga"}) {
-    const Result<Photo> photo = ReadPhoto(folder.Path() / name);
-    ASSERT_FALSE(photo) << name;
-    EXPECT_EQ(photo.error().code, ErrorCode::kBadData);
-    EXPECT_THAT(photo.error().message, HasSubstr(name));
-  }
-}
-
 TEST(ReadPhoto, KnowsTheFormatByContentNotByName) {
   const TempFolder folder;
   ASSERT_TRUE(WriteExr(folder.Path() / "a.png", TestImage()));
@@ -373,47 +165,6 @@ TEST(ReadPhoto, RefusesACroppedExr) {
   EXPECT_EQ(photo.error().code, ErrorCode::kBadData);
   EXPECT_THAT(photo.error().message,
               HasSubstr("data window 4x3+1+0 is not its display window 10x3+0+0"));
-}
-
-// Puts `value` over the number of `width` bytes at `offset`.
-void Patch(std::string& bytes, size_t offset, uint32_t value, size_t width, bool big_endian) {
-  for (size_t i = 0; i < width; ++i) {
-    bytes[offset + (big_endian ? width - 1 - i : i)] = static_cast<char>(value >> (8 * i) & 0xFF);
-  }
-}
-
-TEST(ReadPhoto, RefusesHeadersThatTheFileCannotHold) {
-  const TempFolder folder;
-  for (const uint32_t side : {0U, 40000U, 65535U, 2000000000U}) {
-    for (const char* name : {"a.exr", "a.tga", "a.png", "a.jpg"}) {
-      const std::filesystem::path path = folder.Path() / name;
-      WriteKind(path, {"", path.extension() == ".exr" ? OIIO::TypeFloat : OIIO::TypeUInt8});
-      std::string bytes = ReadBytes(path);
-      if (path.extension() == ".exr") {
-        for (const char* window : {"dataWindow", "displayWindow"}) {
-          // name 0 "box2i" 0 size(4) xMin yMin xMax yMax
-          const size_t box = bytes.find(window) + std::string(window).size() + 1 + 6 + 4;
-          Patch(bytes, box + 8, side - 1, 4, false);
-          Patch(bytes, box + 12, side - 1, 4, false);
-        }
-      } else if (path.extension() == ".tga") {
-        Patch(bytes, 12, std::min(side, 65535U), 2, false);
-        Patch(bytes, 14, std::min(side, 65535U), 2, false);
-      } else if (path.extension() == ".jpg") {
-        const size_t frame = bytes.find("\xFF\xC0");  // marker, length, precision, height, width
-        Patch(bytes, frame + 5, std::min(side, 65500U), 2, true);
-        Patch(bytes, frame + 7, std::min(side, 65500U), 2, true);
-      } else {
-        Patch(bytes, 16, side, 4, true);  // IHDR; its checksum goes wrong too
-        Patch(bytes, 20, side, 4, true);
-      }
-      WriteText(path, bytes);
-      const Result<Photo> photo = ReadPhoto(path);
-      ASSERT_FALSE(photo) << name << ' ' << side;
-      EXPECT_EQ(photo.error().code, ErrorCode::kBadData);
-      EXPECT_THAT(photo.error().message, HasSubstr(name));
-    }
-  }
 }
 
 TEST(ReadImage3, NeedsThreeChannels) {
@@ -457,64 +208,6 @@ TEST(IsPhotoName, GoesByTheEndingInAnyCase) {
   }
   for (const char* name : {"a.nef", "png", "a.png.txt", "lights.txt", ".png"}) {
     EXPECT_FALSE(IsPhotoName(name)) << name;
-  }
-}
-
-TEST(Writers, FailWithTheNameWhereTheFolderIsAbsent) {
-  const TempFolder folder;
-  const std::filesystem::path path = folder.Path() / "absent" / "normal.exr";
-  const Status status = WriteExr(path, TestImage());
-  ASSERT_FALSE(status);
-  EXPECT_EQ(status.error().code, ErrorCode::kIo);
-  EXPECT_THAT(status.error().message, HasSubstr(path.string()));
-  EXPECT_THAT(status.error().message, HasSubstr("No such file or directory"));
-}
-
-// Lets files grow to `bytes` only while it lives, as a full disk would.
-class FileSizeLimit {
- public:
-  explicit FileSizeLimit(rlim_t bytes) {
-    getrlimit(RLIMIT_FSIZE, &before_);
-    signal_before_ = std::signal(SIGXFSZ, SIG_IGN);
-    const rlimit limit{bytes, before_.rlim_max};
-    setrlimit(RLIMIT_FSIZE, &limit);
-  }
-  FileSizeLimit(const FileSizeLimit&) = delete;
-  FileSizeLimit& operator=(const FileSizeLimit&) = delete;
-  ~FileSizeLimit() {
-    setrlimit(RLIMIT_FSIZE, &before_);
-    std::signal(SIGXFSZ, signal_before_);
-  }
-
- private:
-  rlimit before_ = {};
-  void (*signal_before_)(int) = nullptr;
-};
-
-TEST(Writers, NoticeThatTheDiskIsFullAtAnyByte) {
-  const TempFolder folder;
-  const std::filesystem::path exr = folder.Path() / "a.exr";
-  const std::filesystem::path png = folder.Path() / "a.png";
-  const std::array<Image<uint16_t>, 3> planes = {Image<uint16_t>(9, 9, 1), Image<uint16_t>(9, 9, 2),
-                                                 Image<uint16_t>(9, 9, 3)};
-  ASSERT_TRUE(WriteExr(exr, TestImage()));
-  ASSERT_TRUE(WritePng16(png, planes));
-  const std::uintmax_t exr_bytes = std::filesystem::file_size(exr);
-  const std::uintmax_t png_bytes = std::filesystem::file_size(png);
-  for (const std::uintmax_t missing : {1U, 2U, 20U, 70U}) {
-    const Status exr_status = [&] {
-      const FileSizeLimit limit(exr_bytes - missing);
-      return WriteExr(exr, TestImage());
-    }();
-    const Status png_status = [&] {
-      const FileSizeLimit limit(png_bytes - missing);
-      return WritePng16(png, planes);
-    }();
-    ASSERT_FALSE(exr_status) << missing;
-    ASSERT_FALSE(png_status) << missing;
-    EXPECT_EQ(exr_status.error().code, ErrorCode::kIo);
-    EXPECT_THAT(exr_status.error().message, HasSubstr(exr.string()));
-    EXPECT_THAT(png_status.error().message, HasSubstr("File too large"));
   }
 }
 

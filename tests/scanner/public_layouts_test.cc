@@ -74,7 +74,7 @@ TEST(Diligent, RefusesAnIntensityThatCannotBeDividedBy) {
   const TempFolder temp;
   testing::WriteDiligent(temp.Path());
   WriteText(temp.Path() / "light_intensities.txt", "1 2 3\n2 4 6\n3 0 9\n4 8 12\n");
-  EXPECT_THAT(FailureOf(temp.Path()), IsError(ErrorCode::kBadData, "light_intensities.txt:3"));
+  EXPECT_THAT(FailureOf(temp.Path()), IsError(ErrorCode::kBadData, "light_intensities.txt:3: "));
   WriteText(temp.Path() / "light_intensities.txt", "1 2 3\n2 4\n3 6 9\n4 8 12\n");
   EXPECT_THAT(FailureOf(temp.Path()),
               IsError(ErrorCode::kBadData, "light_intensities.txt:2: found 2 numbers"));
@@ -160,7 +160,7 @@ TEST(LightsFolder, RefusesTablesOfAnotherShape) {
   EXPECT_THAT(FailureOfLights(".6 0 .8 1 1 1\n0 .6 .8\n"),
               IsError(ErrorCode::kBadData, "lights.txt:2: found 3 numbers; need 6"));
   EXPECT_THAT(FailureOfLights(".6 0 .8 1 0 1\n0 .6 .8 1 1 1\n"),
-              IsError(ErrorCode::kBadData, "lights.txt:1: intensity"));
+              IsError(ErrorCode::kBadData, "[1, 0, 1]"));
 }
 
 TEST(LightsFolder, NamesTheCountsThatDiffer) {

@@ -76,6 +76,12 @@ TEST(Session, TransformIsWrittenByRows) {
   EXPECT_EQ(json["table_from_sheet"], Json({1, 0, 0, 1, 0, 1, 0, 2, 0, 0, 1, 3, 0, 0, 0, 1}));
 }
 
+TEST(Session, AFileNameThatIsNotUtf8DoesNotEndTheRun) {
+  Session session = FourLightSession();
+  session.frames[0].file = "\xFF.exr";
+  EXPECT_THAT(SessionToJson(session), ::testing::HasSubstr(".exr"));
+}
+
 TEST(Session, EveryKindHasItsName) {
   for (const SessionKind kind :
        {SessionKind::kFabric, SessionKind::kSheet, SessionKind::kChart, SessionKind::kBoard}) {

@@ -41,10 +41,10 @@ TEST(RenderRelief, DomeTiltsOutwardsAndReachesItsSlopeAtTheRim) {
   const RenderedRelief relief = RenderRelief(scene, rig, {101, 101}).value();
 
   EXPECT_EQ(relief.normal[2].At(50, 50), 1.0F);
-  EXPECT_GT(relief.normal[0].At(90, 50), 0.5F);   // right of the centre: tilted to the right
-  EXPECT_GT(relief.normal[1].At(50, 10), 0.5F);   // above the centre: tilted up
+  EXPECT_GT(relief.normal[0].At(90, 50), 0.5F);  // right of the centre: tilted to the right
+  EXPECT_GT(relief.normal[1].At(50, 10), 0.5F);  // above the centre: tilted up
   EXPECT_NEAR(relief.normal[0].At(100, 50), std::sin(60.0 * kRadPerDeg) * 50.0 / 50.5, 1e-6);
-  EXPECT_EQ(relief.normal[2].At(0, 0), 1.0F);     // outside the circle: level
+  EXPECT_EQ(relief.normal[2].At(0, 0), 1.0F);  // outside the circle: level
 }
 
 TEST(RenderRelief, NoLightReachesAFacetThatTurnsAway) {

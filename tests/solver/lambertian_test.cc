@@ -228,7 +228,7 @@ TEST(SolveLambertian, RefusesNearLightsWithoutACamera) {
   BadInput input;
   input.rig.camera.reset();
 
-  EXPECT_THAT(ErrorOf(input).message, HasSubstr("no camera"));
+  EXPECT_THAT(ErrorOf(input).message, HasSubstr("camera is missing, but lights[0] is"));
 }
 
 TEST(LambertianOptions, NamesTheFieldOutOfRange) {

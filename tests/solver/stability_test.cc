@@ -13,8 +13,13 @@ namespace {
 
 using namespace sateen::testing;  // NOLINT(google-build-using-namespace): the cases of this file
 
-// Float arithmetic rounds each of about ten operations a sample; measured, never above 4.
+// Float arithmetic rounds about ten operations a sample and the lights besides: measured, three
+// times the error of the reference on noiseless data.
 constexpr double kFloatFactor = 8.0;
+// What that comes to at the worst conditioning that kFast accepts; a tenth and a fifth of the bars
+// for noiseless scenes, a hundredth of what a 14-bit sensor leaves.
+constexpr double kFloatFloorMaxDeg = 1e-4;
+constexpr double kFloatFloorMeanDeg = 2e-5;
 
 struct Case {
   LightStack stack;
@@ -47,8 +52,8 @@ void ExpectLaw(const Case& c, double bound_deg, const LambertianOptions& options
     EXPECT_LE(error.max, in_float ? kFloatFactor * bound_deg : bound_deg);
     if (backend == Backend::kAuto) {
       EXPECT_EQ(field.reason.pixels, reference.reason.pixels);
-      EXPECT_LE(error.max, std::max(2.0 * reference_error.max, kFloatFactor * RoundingBoundDeg(1)));
-      EXPECT_LE(error.mean, std::max(2.0 * reference_error.mean, RoundingBoundDeg(1)));
+      EXPECT_LE(error.max, std::max(2.0 * reference_error.max, kFloatFloorMaxDeg));
+      EXPECT_LE(error.mean, std::max(2.0 * reference_error.mean, kFloatFloorMeanDeg));
     }
   }
 }
@@ -98,12 +103,12 @@ TEST(Stability, LightsBeyondTheConditionLimitAreRefusedAsAWhole) {
 }
 
 TEST(Stability, CoplanarForSomePixelsOnly) {
-  // Near lights above the line y = 0: exactly coplanar for pixels on it, nearly so beside it.
+  // Near lights in the plane y = 0: exactly coplanar for pixels on it, nearly so beside it.
   const ImageSize size{64, 41};
   Rig rig = RingRig(size);
   for (size_t k = 0; k < rig.lights.size(); ++k) {
     const double x_mm = -180.0 + 40.0 * static_cast<double>(k);
-    rig.lights[k].position_mm = Eigen::Vector3d(x_mm, 0.0, 300.0);
+    rig.lights[k].position_mm = Eigen::Vector3d(x_mm, 0.0, k % 2 == 0 ? 200.0 : 500.0);
   }
   const Case c = MakeCase(rig, size, 20.0);
 

@@ -1,0 +1,274 @@
+#include "cli/solve.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+
+#include <csignal>
+
+#include "imaging/image_io.h"
+#include "tests/cli/cli_runner.h"
+#include "tests/testing/files.h"
+
+namespace sateen {
+namespace {
+
+using sateen::testing::DataDir;
+using sateen::testing::RunResult;
+using sateen::testing::Simulate;
+using sateen::testing::Solve;
+using sateen::testing::TempFolder;
+using sateen::testing::WriteText;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+namespace fs = std::filesystem;
+
+constexpr const char* kRig = R"({
+  "schema": "sateen.rig/1",
+  "camera": {"model": "test", "size_px": [48, 32], "k": [146.4, 146.4, 23.5, 15.5],
+             "distortion": [0, 0, 0, 0, 0],
+             "table_from_camera": [1, 0, 0, 0, 0, -1, 0, 0, 0, 0, -1, 610, 0, 0, 0, 1]},
+  "lights": [
+    {"name": "east", "channel": 0, "model": "near", "position_mm": [400, 0, 450], "flux_rgb": [0.4, 0.4, 0.4]},
+    {"name": "north", "channel": 1, "model": "near", "position_mm": [0, 400, 450], "flux_rgb": [0.4, 0.4, 0.4]},
+    {"name": "west", "channel": 2, "model": "near", "position_mm": [-400, 0, 450], "flux_rgb": [0.4, 0.4, 0.4]},
+    {"name": "south", "channel": 3, "model": "near", "position_mm": [0, -400, 450], "flux_rgb": [0.4, 0.4, 0.4]}]
+})";
+constexpr const char* kScene = R"({
+  "schema": "sateen.scene/1", "rig": "rig.json",
+  "surface": {"shape": "dome", "max_slope_deg": 30}, "albedo": {"min": 0.2, "max": 0.8}
+})";
+
+class SolveCommand : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    WriteText(Path("rig.json"), kRig);
+    WriteText(Path("scene.json"), kScene);
+    const RunResult run = Simulate({Path("scene.json"), "-o", Path("session")});
+    ASSERT_EQ(run.exit_status, 0) << run.log;
+  }
+
+  [[nodiscard]] std::string Path(const std::string& name) const {
+    return (folder_.Path() / name).string();
+  }
+
+ private:
+  TempFolder folder_;
+};
+
+TEST_F(SolveCommand, PrintsTheFixedNamesAsJson) {
+  const RunResult run = Solve({Path("session"), "-o", Path("maps"), "--json", "--threads", "1"});
+
+  ASSERT_EQ(run.exit_status, 0) << run.log;
+  EXPECT_THAT(run.log, IsEmpty());
+  const nlohmann::json json = run.Json();
+  EXPECT_EQ(json.at("schema"), "sateen.solve/1");
+  EXPECT_EQ(json.at("pixels"), 48 * 32);
+  EXPECT_EQ(json.at("solved"), 48 * 32);
+  EXPECT_EQ(json.at("threads"), 1);
+  EXPECT_EQ(json.at("backend"), "auto");
+  EXPECT_GT(json.at("seconds"), 0.0);
+  for (const char* figure : {"mean", "median", "p99", "max"}) {
+    // Noiseless: the bar for the maximum.
+    EXPECT_LT(json.at("angular_error_deg").at(figure), 1e-3) << figure;
+  }
+  EXPECT_LT(json.at("albedo_error").at("max"), 1e-5);
+}
+
+TEST_F(SolveCommand, WritesTheMapsAndTheirRecord) {
+  ASSERT_EQ(Solve({Path("session"), "-o", Path("maps")}).exit_status, 0);
+
+  for (const char* name : {"normal.exr", "normal.png", "albedo.exr", "residual.exr", "samples.png",
+                           "reason.png", "error.exr", "overview.png", "solve.json"}) {
+    EXPECT_TRUE(fs::exists(Path(std::string("maps/") + name))) << name;
+  }
+  const Image3 normal = ReadImage3(Path("maps/normal.exr")).value();
+  const Image3 truth = ReadImage3(Path("session/truth/normal.exr")).value();
+  EXPECT_NEAR(normal[1].At(24, 4), truth[1].At(24, 4), 1e-5);
+  EXPECT_GT(truth[1].At(24, 4), 0.1F);  // above the centre of a dome: y up
+}
+
+TEST_F(SolveCommand, NormalYDownFlipsTheSecondChannelAlone) {
+  ASSERT_EQ(Solve({Path("session"), "-o", Path("up")}).exit_status, 0);
+  ASSERT_EQ(Solve({Path("session"), "-o", Path("down"), "--normal-y", "down"}).exit_status, 0);
+
+  const Image3 up = ReadImage3(Path("up/normal.exr")).value();
+  const Image3 down = ReadImage3(Path("down/normal.exr")).value();
+  for (size_t p = 0; p < up[0].pixels.size(); ++p) {
+    EXPECT_EQ(up[0].pixels[p], down[0].pixels[p]);
+    EXPECT_EQ(up[1].pixels[p], -down[1].pixels[p]);
+    EXPECT_EQ(up[2].pixels[p], down[2].pixels[p]);
+  }
+  const Image3 png = ReadPhoto(Path("down/normal.png"), Encoding::kLinear).value().rgb;
+  EXPECT_LT(png[1].At(24, 4), 0.5F);
+}
+
+TEST_F(SolveCommand, UsesOnlyTheLightsAsked) {
+  const RunResult run = Solve({Path("session"), "-o", Path("maps"), "--lights", "0,1,3", "--json"});
+
+  ASSERT_EQ(run.exit_status, 0) << run.log;
+  EXPECT_EQ(run.Json().at("lights"), 3);
+}
+
+TEST_F(SolveCommand, TakesAnotherRig) {
+  std::string dimmer = kRig;
+  for (size_t at = dimmer.find("0.4, 0.4, 0.4"); at != std::string::npos;
+       at = dimmer.find("0.4, 0.4, 0.4")) {
+    dimmer.replace(at, 13, "0.8, 0.8, 0.8");
+  }
+  WriteText(Path("other.json"), dimmer);
+
+  const RunResult run =
+      Solve({Path("session"), "-o", Path("maps"), "--rig", Path("other.json"), "--json"});
+
+  ASSERT_EQ(run.exit_status, 0) << run.log;
+  // Twice the light is said to have come, so the albedo halves.
+  EXPECT_NEAR(run.Json().at("albedo_error").at("mean"), 0.5, 1e-5);
+}
+
+TEST_F(SolveCommand, WrongOptionsAreUsageErrors) {
+  EXPECT_EQ(Solve({Path("session")}).exit_status, 2);
+  EXPECT_EQ(Solve({Path("session"), "-o", Path("m"), "--backend", "svd"}).exit_status, 2);
+  EXPECT_EQ(Solve({Path("session"), "-o", Path("m"), "--robust", "l1"}).exit_status, 2);
+  const RunResult run = Solve({Path("session"), "-o", Path("m"), "--clip-level", "2"});
+  EXPECT_EQ(run.exit_status, 2);
+  EXPECT_THAT(run.log, HasSubstr("clip_level = 2; need"));
+  EXPECT_EQ(Solve({Path("session"), "-o", Path("m"), "--lights", "0,1,9"}).exit_status, 2);
+  EXPECT_FALSE(fs::exists(Path("m")));
+}
+
+TEST_F(SolveCommand, AFrameThatIsCutShortIsNamedAndNothingIsWritten) {
+  const std::string frame = Path("session/frames/west.exr");
+  fs::resize_file(frame, fs::file_size(frame) / 2);
+
+  const RunResult run = Solve({Path("session"), "-o", Path("maps")});
+
+  EXPECT_EQ(run.exit_status, 3);
+  EXPECT_THAT(run.log, AllOf(HasSubstr("sateen solve: error: "), HasSubstr("west.exr")));
+  EXPECT_THAT(run.out, IsEmpty());
+  EXPECT_FALSE(fs::exists(Path("maps")));
+}
+
+TEST_F(SolveCommand, AMissingCaptureIsAnIoError) {
+  const RunResult run = Solve({Path("nowhere"), "-o", Path("maps")});
+
+  EXPECT_EQ(run.exit_status, 4);
+  EXPECT_THAT(run.log, HasSubstr("nowhere"));
+}
+
+TEST_F(SolveCommand, AnEmptyFolderIsBadData) {
+  fs::create_directory(Path("empty"));
+
+  const RunResult run = Solve({Path("empty"), "-o", Path("maps")});
+
+  EXPECT_EQ(run.exit_status, 3);
+  EXPECT_THAT(run.log, HasSubstr("session.json"));
+}
+
+TEST_F(SolveCommand, AnOutputThatIsAFileIsAnIoError) {
+  WriteText(Path("taken"), "mine");
+
+  const RunResult run = Solve({Path("session"), "-o", Path("taken")});
+
+  EXPECT_EQ(run.exit_status, 4);
+  EXPECT_THAT(run.log, HasSubstr("taken"));
+}
+
+TEST_F(SolveCommand, CancellingLeavesNothing) {
+  const std::atomic<bool> cancel = true;
+
+  const RunResult run = Solve({Path("session"), "-o", Path("maps")}, {.cancel = &cancel});
+
+  EXPECT_EQ(run.exit_status, 6);
+  EXPECT_FALSE(fs::exists(Path("maps")));
+}
+
+// A disk that is full after `bytes`: writes beyond fail as they do on a full file system.
+class FullDisk {
+ public:
+  explicit FullDisk(rlim_t bytes) : handler_(std::signal(SIGXFSZ, SIG_IGN)) {
+    getrlimit(RLIMIT_FSIZE, &before_);
+    const rlimit limited{bytes, before_.rlim_max};
+    setrlimit(RLIMIT_FSIZE, &limited);
+  }
+  FullDisk(const FullDisk&) = delete;
+  FullDisk& operator=(const FullDisk&) = delete;
+  ~FullDisk() {
+    setrlimit(RLIMIT_FSIZE, &before_);
+    std::signal(SIGXFSZ, handler_);
+  }
+
+ private:
+  rlimit before_ = {};
+  void (*handler_)(int);
+};
+
+TEST_F(SolveCommand, AFullDiskLeavesTheFormerMapsWhole) {
+  ASSERT_EQ(Solve({Path("session"), "-o", Path("maps")}).exit_status, 0);
+  const Image3 before = ReadImage3(Path("maps/normal.exr")).value();
+  const auto files = std::distance(fs::directory_iterator(Path("maps")), {});
+
+  RunResult run;
+  {
+    const FullDisk full(4000);
+    run = Solve({Path("session"), "-o", Path("maps"), "--normal-y", "down"});
+  }
+
+  EXPECT_EQ(run.exit_status, 4);
+  EXPECT_THAT(run.log, HasSubstr(".exr"));
+  EXPECT_EQ(ReadImage3(Path("maps/normal.exr")).value()[1].pixels, before[1].pixels);
+  EXPECT_EQ(std::distance(fs::directory_iterator(Path("maps")), {}), files);
+}
+
+// ---- Real photographs ----------------------------------------------------------------------------
+
+class RealData : public ::testing::Test {
+ protected:
+  // The mean angular error of a solve, or a failure.
+  double MeanErrorDeg(const fs::path& capture, std::vector<std::string> more = {}) {
+    std::vector<std::string> words = {(DataDir() / capture).string(), "-o",
+                                      (folder_.Path() / "maps").string(), "--json"};
+    words.insert(words.end(), more.begin(), more.end());
+    const RunResult run = Solve(words);
+    EXPECT_EQ(run.exit_status, 0) << run.log;
+    return run.exit_status == 0 ? run.Json().at("angular_error_deg").at("mean").get<double>()
+                                : -1.0;
+  }
+
+  TempFolder folder_;
+};
+
+TEST_F(RealData, DiligentBallIsSolvedAsPublished) {
+  SATEEN_NEEDS_DATA("diligent-ball");
+
+  // Published for plain least squares: 4.10; the bar is 4.3. Better than 3 would be another method.
+  const double mean_deg = MeanErrorDeg("diligent-ball");
+  EXPECT_GT(mean_deg, 3.0);
+  EXPECT_LT(mean_deg, 4.3);
+  EXPECT_NEAR(MeanErrorDeg("diligent-ball", {"--backend", "jacobi-svd"}), mean_deg, 1e-4);
+}
+
+TEST_F(RealData, BunnyOfEveryRenderingIsSolvedAsByOthers) {
+  SATEEN_NEEDS_DATA("bunny");
+
+  // Least squares of all samples, shadows included: 4.16 (lambert) and 18.47 (specular).
+  EXPECT_NEAR(MeanErrorDeg("bunny/specular", {"--shadow-level", "0"}), 18.47, 0.3);
+  EXPECT_LT(MeanErrorDeg("bunny/lambert"), 4.2);
+}
+
+TEST_F(RealData, EightBitPhotographsAreLinearisedWithAWarning) {
+  SATEEN_NEEDS_DATA("uw-psm");
+
+  const RunResult run = Solve(
+      {(DataDir() / "uw-psm/cat").string(), "-o", (folder_.Path() / "maps").string(), "--json"});
+
+  ASSERT_EQ(run.exit_status, 0) << run.log;
+  EXPECT_THAT(run.log, HasSubstr("sRGB"));
+  EXPECT_EQ(run.Json().at("lights"), 12);
+  EXPECT_GT(run.Json().at("solved").get<double>(), 0.98 * run.Json().at("pixels").get<double>());
+}
+
+}  // namespace
+}  // namespace sateen
