@@ -177,7 +177,7 @@ class Bench {
   }
 
   const BenchSolveArgs& args_;
-  const Task& task_;
+  const Task task_;
   std::vector<int> thread_counts_;
   NormalField field_;  // reused, so that no run pays for fresh memory
   BenchReport report_;
@@ -207,7 +207,7 @@ void AddBenchSolve(CLI::App& bench, BenchSolveArgs& args) {
 
 int RunBenchSolve(const BenchSolveArgs& args, const Task& task, std::ostream& out,
                   std::ostream& log) {
-  const Result<BenchReport> report = Bench(args, task).Run();
+  const Result<BenchReport> report = Bench(args, task.WithThreads(args.threads)).Run();
   Status status;
   if (!report) {
     status = tl::unexpected(report.error());

@@ -36,17 +36,14 @@ int Run(int argc, char** argv) {
   }
   sateen::InstallInterruptHandlers();
   sateen::ProgressBar progress(2);
-  const auto task = [&](int threads) {
-    return sateen::Task{
-        .threads = threads, .progress = &progress, .cancel = &sateen::InterruptFlag()};
-  };
+  const sateen::Task task{.progress = &progress, .cancel = &sateen::InterruptFlag()};
   if (app.got_subcommand("solve")) {
-    return RunSolve(solve, task(solve.threads), std::cout, std::cerr);
+    return RunSolve(solve, task, std::cout, std::cerr);
   }
   if (app.got_subcommand("simulate")) {
-    return RunSimulate(simulate, task(simulate.threads), std::cout, std::cerr);
+    return RunSimulate(simulate, task, std::cout, std::cerr);
   }
-  return RunBenchSolve(bench_solve, task(bench_solve.threads), std::cout, std::cerr);
+  return RunBenchSolve(bench_solve, task, std::cout, std::cerr);
 }
 
 }  // namespace

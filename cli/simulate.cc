@@ -150,7 +150,7 @@ void AddSimulate(CLI::App& root, SimulateArgs& args) {
 }
 
 int RunSimulate(const SimulateArgs& args, const Task& task, std::ostream& out, std::ostream& log) {
-  const Result<SceneFile> file = Simulate(args, task);
+  const Result<SceneFile> file = Simulate(args, task.WithThreads(args.threads));
   if (!file) {
     log << "sateen simulate: error: " << file.error().message << '\n';
     return ExitStatus(file.error());

@@ -167,7 +167,7 @@ void AddSolve(CLI::App& root, SolveArgs& args) {
 }
 
 int RunSolve(const SolveArgs& args, const Task& task, std::ostream& out, std::ostream& log) {
-  const Result<SolveOutcome> outcome = SolveCapture(args, task, log);
+  const Result<SolveOutcome> outcome = SolveCapture(args, task.WithThreads(args.threads), log);
   if (!outcome) {
     log << "sateen solve: error: " << outcome.error().message << '\n';
     return ExitStatus(outcome.error());

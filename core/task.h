@@ -32,6 +32,10 @@ struct Task {
   // kCancelled once `cancel` is set.
   [[nodiscard]] Status CheckCancelled() const;
   [[nodiscard]] int ThreadCount() const;
+  // The same on another number of threads.
+  [[nodiscard]] Task WithThreads(int count) const {
+    return {.threads = count, .progress = progress, .cancel = cancel};
+  }
   void BeginStage(std::string_view name, int total) const;
   void Advance(int steps = 1) const;
 };

@@ -50,7 +50,7 @@ TEST(SimulateCommand, NamesTheKeyThatIsWrong) {
   const std::string head = R"({"schema": "sateen.scene/1", "rig": "rig.json", )";
 
   EXPECT_THAT(log_of(head + R"("surface": {"shape": "cube"}, "albedo": {"min": 0.1, "max": 1}})"),
-              HasSubstr("surface.shape: 'cube'; need flat, dome or ripple"));
+              HasSubstr("surface.shape 'cube'; need flat, dome or ripple"));
   EXPECT_THAT(log_of(head + R"("surface": {"shape": "dome", "max_slope_deg": 90},
                                "albedo": {"min": 0.1, "max": 1}})"),
               HasSubstr("surface.max_slope_deg"));

@@ -253,8 +253,9 @@ TEST_F(RealData, DiligentBallIsSolvedAsPublished) {
 TEST_F(RealData, BunnyOfEveryRenderingIsSolvedAsByOthers) {
   SATEEN_NEEDS_DATA("bunny");
 
-  // Least squares of all samples, shadows included: 4.16 (lambert) and 18.47 (specular).
-  EXPECT_NEAR(MeanErrorDeg("bunny/specular", {"--shadow-level", "0"}), 18.47, 0.3);
+  // Least squares of all samples, shadows included: 4.16 (lambert) and 18.47 (specular). Here
+  // samples of zero are always left out, which moves the specular one by less than half a degree.
+  EXPECT_NEAR(MeanErrorDeg("bunny/specular", {"--shadow-level", "0"}), 18.47, 0.5);
   EXPECT_LT(MeanErrorDeg("bunny/lambert"), 4.2);
 }
 
