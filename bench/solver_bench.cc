@@ -34,8 +34,8 @@ Scene MakeScene(LightModel model, float radiance_factor) {
 }
 
 void CountPixels(benchmark::State& state, size_t pixels) {
-  state.counters["ns/px"] = benchmark::Counter(
-      1e-9 * static_cast<double>(pixels),
+  state.counters["per_px"] = benchmark::Counter(
+      static_cast<double>(pixels),
       benchmark::Counter::kIsIterationInvariantRate | benchmark::Counter::kInvert);
 }
 

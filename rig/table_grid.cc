@@ -48,6 +48,22 @@ Cubic CubicAt(const std::vector<Eigen::Vector2d>& knots, int first) {
   return Cubic(std::span(knots).subspan(static_cast<size_t>(first)).first<4>());
 }
 
+// One coordinate at t, t + step, ... In float, which is four times as fast as double: the cubic spans
+// a few millimetres, and a, to which it is added, is rounded once as any float position is.
+void Fill(const Cubic& cubic, Eigen::Index coordinate, float t, float step,
+          std::span<float> positions_mm) {
+  const auto a = static_cast<float>(cubic.a[coordinate]);
+  const auto b = static_cast<float>(cubic.b[coordinate]);
+  const auto c = static_cast<float>(cubic.c[coordinate]);
+  const auto d = static_cast<float>(cubic.d[coordinate]);
+  const auto count = static_cast<int>(positions_mm.size());
+  float* const out = positions_mm.data();
+  for (int i = 0; i < count; ++i) {
+    const float at = t + step * static_cast<float>(i);
+    out[i] = a + at * (b + (at - 1.0F) * (c + (at - 2.0F) * d));
+  }
+}
+
 tl::unexpected<Error> NotSeen(double u, double v) {
   return Fail(ErrorCode::kBadData,
               "camera: pixel ({:.0f}, {:.0f}) does not see the table with this lens and pose; "
@@ -137,17 +153,22 @@ void TableGrid::Row(int v, std::span<float> x_mm, std::span<float> y_mm) const {
   SATEEN_CHECK(x_mm.size() == static_cast<size_t>(size_px_.width) && y_mm.size() == x_mm.size());
   std::vector<Eigen::Vector2d> knots;
   KnotsAtRow(v, knots);
-  int first = 0;
-  Cubic cubic = CubicAt(knots, first);
-  for (size_t u = 0; u < x_mm.size(); ++u) {
-    const Place place = PlaceOf(static_cast<double>(u), size_px_.width, columns_ - 1);
-    if (place.first != first) {
-      first = place.first;
-      cubic = CubicAt(knots, first);
-    }
-    const Eigen::Vector2d position = cubic.At(place.t);
-    x_mm[u] = static_cast<float>(position.x());
-    y_mm[u] = static_cast<float>(position.y());
+  const int intervals = columns_ - 1;
+  const float step = size_px_.width > 1
+                         ? static_cast<float>(intervals) / static_cast<float>(size_px_.width - 1)
+                         : 0.0F;
+  int u = 0;
+  for (int cell = 0; u < size_px_.width; ++cell) {
+    const double cell_end =
+        cell + 1 < intervals ? PixelOf(cell + 1, size_px_.width, intervals) : size_px_.width;
+    const auto begin = static_cast<size_t>(u);
+    const auto count = static_cast<size_t>(std::max(0, static_cast<int>(std::ceil(cell_end)) - u));
+    const Place place = PlaceOf(u, size_px_.width, intervals);
+    const Cubic cubic = CubicAt(knots, place.first);
+    const auto t = static_cast<float>(place.t);
+    Fill(cubic, 0, t, step, x_mm.subspan(begin, count));
+    Fill(cubic, 1, t, step, y_mm.subspan(begin, count));
+    u += static_cast<int>(count);
   }
 }
 
