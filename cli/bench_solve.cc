@@ -208,6 +208,7 @@ void AddBenchSolve(CLI::App& bench, BenchSolveArgs& args) {
 int RunBenchSolve(const BenchSolveArgs& args, const Task& task, std::ostream& out,
                   std::ostream& log) {
   const Result<BenchReport> report = Bench(args, task.WithThreads(args.threads)).Run();
+  task.ClearProgress();
   Status status;
   if (!report) {
     status = tl::unexpected(report.error());

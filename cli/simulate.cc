@@ -151,6 +151,7 @@ void AddSimulate(CLI::App& root, SimulateArgs& args) {
 
 int RunSimulate(const SimulateArgs& args, const Task& task, std::ostream& out, std::ostream& log) {
   const Result<SceneFile> file = Simulate(args, task.WithThreads(args.threads));
+  task.ClearProgress();
   if (!file) {
     log << "sateen simulate: error: " << file.error().message << '\n';
     return ExitStatus(file.error());

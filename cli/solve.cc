@@ -75,6 +75,7 @@ Result<SolveOutcome> SolveCapture(const SolveArgs& args, const Task& task, std::
   if (!capture) {
     return tl::unexpected(capture.error());
   }
+  task.ClearProgress();
   for (const std::string& warning : capture->warnings) {
     log << "sateen solve: warning: " << warning << '\n';
   }
@@ -168,6 +169,7 @@ void AddSolve(CLI::App& root, SolveArgs& args) {
 
 int RunSolve(const SolveArgs& args, const Task& task, std::ostream& out, std::ostream& log) {
   const Result<SolveOutcome> outcome = SolveCapture(args, task.WithThreads(args.threads), log);
+  task.ClearProgress();
   if (!outcome) {
     log << "sateen solve: error: " << outcome.error().message << '\n';
     return ExitStatus(outcome.error());

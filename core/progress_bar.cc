@@ -23,9 +23,13 @@ void Write(int fd, const std::string& text) {
 
 ProgressBar::ProgressBar(int fd) : fd_(fd), on_terminal_(isatty(fd) == 1) {}
 
-ProgressBar::~ProgressBar() {
+ProgressBar::~ProgressBar() { Clear(); }
+
+void ProgressBar::Clear() {
+  const std::lock_guard lock(mutex_);
   if (on_terminal_ && !stage_.empty()) {
     Write(fd_, fmt::format("\r{:{}}\r", "", kLineWidth));
+    stage_.clear();
   }
 }
 
@@ -46,7 +50,7 @@ void ProgressBar::Advance(int steps) {
   }
   const std::lock_guard lock(mutex_);
   done_ += steps;
-  if (std::chrono::steady_clock::now() - drawn_at_ >= kMinInterval) {
+  if (!stage_.empty() && std::chrono::steady_clock::now() - drawn_at_ >= kMinInterval) {
     Draw();
   }
 }

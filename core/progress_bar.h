@@ -18,6 +18,7 @@ class ProgressBar : public Progress {
 
   void BeginStage(std::string_view name, int total) override;
   void Advance(int steps) override;
+  void Clear() override;
 
  private:
   void Draw();

@@ -28,4 +28,10 @@ void Task::Advance(int steps) const {
   }
 }
 
+void Task::ClearProgress() const {
+  if (progress != nullptr) {
+    progress->Clear();
+  }
+}
+
 }  // namespace sateen

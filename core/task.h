@@ -18,6 +18,8 @@ class Progress {
   // Starts a stage of `total` steps; the stage before it is complete.
   virtual void BeginStage(std::string_view name, int total) = 0;
   virtual void Advance(int steps) = 0;
+  // Makes room for other output; the next stage shows itself again.
+  virtual void Clear() = 0;
 };
 
 // What a long operation is run under. The default runs silently, on all cores, to its end.
@@ -38,6 +40,7 @@ struct Task {
   }
   void BeginStage(std::string_view name, int total) const;
   void Advance(int steps = 1) const;
+  void ClearProgress() const;
 };
 
 }  // namespace sateen

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
-#include <cstring>
 #include <fstream>
 #include <iterator>
 #include <map>
@@ -126,11 +125,13 @@ class TiffWalk {
     const auto first = [&fields](Tag tag) -> uint64_t {
       return fields[tag].empty() ? 0 : fields[tag].front();
     };
-    if (first(kTileWidth) == 0 || first(kTileLength) == 0) {
+    const uint64_t tile_width = first(kTileWidth);
+    const uint64_t tile_length = first(kTileLength);
+    if (tile_width == 0 || tile_length == 0) {
       return;
     }
-    const uint64_t columns = (first(kImageWidth) + first(kTileWidth) - 1) / first(kTileWidth);
-    const uint64_t rows = (first(kImageLength) + first(kTileLength) - 1) / first(kTileLength);
+    const uint64_t columns = (first(kImageWidth) + tile_width - 1) / tile_width;
+    const uint64_t rows = (first(kImageLength) + tile_length - 1) / tile_length;
     missing_tiles_ += std::max<uint64_t>(columns * rows, fields[kTileOffsets].size()) -
                       fields[kTileOffsets].size();
   }
@@ -179,7 +180,8 @@ Result<FileHead> ReadFileHead(const std::filesystem::path& path) {
   FileHead head;
   head.bytes.resize(kHeadBytes);
   if (!stream) {
-    return Fail(ErrorCode::kIo, "{}: cannot be opened: {}", path.string(), std::strerror(errno));
+    return Fail(ErrorCode::kIo, "{}: cannot be opened: {}", path.string(),
+                std::generic_category().message(errno));
   }
   stream.read(head.bytes.data(), static_cast<std::streamsize>(kHeadBytes));
   head.bytes.resize(static_cast<size_t>(stream.gcount()));

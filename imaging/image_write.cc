@@ -2,12 +2,12 @@
 #include <OpenImageIO/imageio.h>
 
 #include <cerrno>
-#include <cstring>
 #include <exception>
 #include <fstream>
 #include <memory>
 #include <span>
 #include <string>
+#include <system_error>
 #include <vector>
 
 #include "core/check.h"
@@ -65,7 +65,7 @@ Status Write(const std::filesystem::path& path, const char* format,
     file.close();
     if (!file) {
       return Fail(ErrorCode::kIo, "{}: cannot be written whole ({} bytes): {}", path.string(),
-                  bytes->size(), std::strerror(errno));
+                  bytes->size(), std::generic_category().message(errno));
     }
     return {};
   } catch (const std::exception& error) {

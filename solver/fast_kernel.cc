@@ -8,110 +8,23 @@
 #include <hwy/cache_control.h>
 #include <hwy/contrib/math/math-inl.h>
 #include <hwy/highway.h>
-#if HWY_ARCH_X86
-#include <xmmintrin.h>
-#endif
 
 #include <algorithm>
 #include <cstring>
 
 #include "imaging/color.h"
+#include "solver/fast_kernel_spans-inl.h"
+#include "solver/fast_kernel_vectors-inl.h"
 #include "solver/lambertian.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace sateen::HWY_NAMESPACE {
-namespace hn = hwy::HWY_NAMESPACE;
-
-using D = hn::ScalableTag<float>;
-using DI = hn::RebindToSigned<D>;
-using V = hn::Vec<D>;
-using VI = hn::Vec<DI>;
-using M = hn::Mask<D>;
-
 // Scratch vectors of one light: l (near lights only), i' red, green, blue, luminance.
 constexpr size_t kScratchPerLight = 7;
 
 // 3 K streams are more than the hardware prefetchers follow. Fetching three cache lines ahead took
 // ten near lights on two cores from 11.5 to 8.1 ns/px (floor 5.9); two to four lines do as well.
 constexpr size_t kPrefetchAhead = 48;
-
-// Subnormal inputs count as zero while this lives; SolveVector rescues pixels that need them.
-class FlushSubnormals {
- public:
-#if HWY_ARCH_X86
-  FlushSubnormals() : saved_(_mm_getcsr()) { _mm_setcsr(saved_ | 0x8040U); }
-  ~FlushSubnormals() { _mm_setcsr(saved_); }
-  FlushSubnormals(const FlushSubnormals&) = delete;
-  FlushSubnormals& operator=(const FlushSubnormals&) = delete;
-
- private:
-  unsigned saved_;
-#endif
-};
-
-HWY_INLINE M NoLanes() { return hn::FirstN(D(), 0); }
-
-struct Vector3 {
-  V x, y, z;
-};
-
-HWY_INLINE V Dot(const Vector3& a, const Vector3& b) {
-  return hn::MulAdd(a.x, b.x, hn::MulAdd(a.y, b.y, hn::Mul(a.z, b.z)));
-}
-
-// ---- Radiance far from 1 -----------------------------------------------------------------------
-
-constexpr float kTwoTo40 = 1.099511627776e12F;
-constexpr float kTwoToMinus40 = 1.0F / kTwoTo40;
-constexpr int32_t kSmallestNormalBits = 0x00800000;
-constexpr int32_t kInfinityBits = 0x7f800000;
-constexpr float kTwoTo49 = 562949953421312.0F;
-
-// Per lane, a power of two by which samples are multiplied and results divided.
-struct Scale {
-  V forward;
-  V backward;
-  M subnormal;  // the lane's samples may be subnormal: forward = 2^100
-};
-
-HWY_INLINE Scale ScaleFor(VI brightest_bits) {
-  const D d;
-  const DI di;
-  const auto bits_of = [&](int exponent) { return hn::Set(di, (exponent + 127) << 23); };
-  VI exponent = hn::Set(di, 0);
-  exponent = hn::IfThenElse(hn::Lt(brightest_bits, bits_of(-40)), hn::Set(di, 60), exponent);
-  const auto tiny = hn::Lt(brightest_bits, bits_of(-100));
-  exponent = hn::IfThenElse(tiny, hn::Set(di, 100), exponent);
-  exponent = hn::IfThenElse(hn::Gt(brightest_bits, bits_of(40)), hn::Set(di, -60), exponent);
-  exponent = hn::IfThenElse(hn::Gt(brightest_bits, bits_of(90)), hn::Set(di, -100), exponent);
-  const VI bias = hn::Set(di, 127);
-  return {hn::BitCast(d, hn::ShiftLeft<23>(hn::Add(bias, exponent))),
-          hn::BitCast(d, hn::ShiftLeft<23>(hn::Sub(bias, exponent))), hn::RebindMask(d, tiny)};
-}
-
-HWY_INLINE V ScaleUp(V value, const Scale& scale) {
-  const D d;
-  const DI di;
-  const VI bits = hn::BitCast(di, value);
-  const VI magnitude = hn::And(bits, hn::Set(di, 0x7fffffff));
-  // A subnormal is its significand times 2^-149, and 2^-149 * 2^100 = 2^-49.
-  const V exact =
-      hn::CopySign(hn::Mul(hn::ConvertTo(d, magnitude), hn::Set(d, 1.0F / kTwoTo49)), value);
-  const M subnormal = hn::And(
-      scale.subnormal, hn::RebindMask(d, hn::Lt(magnitude, hn::Set(di, kSmallestNormalBits))));
-  return hn::IfThenElse(subnormal, exact, hn::Mul(value, scale.forward));
-}
-
-HWY_INLINE V ScaleDown(V value, const Scale& scale) {
-  const D d;
-  const V result = hn::Mul(value, scale.backward);
-  const V significand = hn::Mul(value, hn::Set(d, kTwoTo49));
-  const M subnormal = hn::And(
-      scale.subnormal, hn::Lt(significand, hn::Set(d, static_cast<float>(kSmallestNormalBits))));
-  // Lanes that are not subnormal must not overflow the conversion.
-  const V safe = hn::IfThenElseZero(subnormal, significand);
-  return hn::IfThenElse(subnormal, hn::BitCast(d, hn::NearestInt(safe)), result);
-}
 
 // ---- Pass 1: lights and samples ----------------------------------------------------------------
 
@@ -479,74 +392,6 @@ HWY_INLINE void SolveVector(const KernelParams& params, const KernelInput& input
       output.samples + offset);
   StoreBytes(hn::IfThenElseZero(inside_bits, ReasonOf(gathered, enough, accepted)),
              output.reason + offset);
-}
-
-HWY_INLINE void TouchVector(const KernelParams& params, const KernelInput& input, size_t offset,
-                            const KernelOutput& output) {
-  const D d;
-  V sum = hn::Zero(d);
-  for (size_t p = 0; p < 3 * params.lights.size(); ++p) {
-    sum = hn::Add(sum, hn::LoadU(d, input.planes[p] + offset));
-  }
-  for (size_t c = 0; c < 3; ++c) {
-    hn::StoreU(sum, d, output.normal[c] + offset);
-    hn::StoreU(sum, d, output.albedo[c] + offset);
-  }
-  hn::StoreU(sum, d, output.residual + offset);
-  const VI bytes = hn::Set(DI(), 1);
-  StoreBytes(bytes, output.samples + offset);
-  StoreBytes(bytes, output.reason + offset);
-}
-
-// Runs `solve(input, offset, output)` over whole vectors, then over a padded copy of the rest.
-template <typename Solve>
-HWY_INLINE void ForEachVector(const KernelParams& params, const KernelInput& input,
-                              const KernelOutput& output, const Solve& solve) {
-  const size_t lanes = hn::Lanes(D());
-  const size_t whole = input.count / lanes * lanes;
-  for (size_t offset = 0; offset < whole; offset += lanes) {
-    solve(input, offset, output);
-  }
-  const size_t rest = input.count - whole;
-  if (rest == 0) {
-    return;
-  }
-  const size_t plane_count = 3 * params.lights.size();
-  std::vector<float> padded((plane_count + 2) * lanes, 0.0F);
-  std::vector<const float*> planes(plane_count);
-  const auto pad = [&](size_t index, const float* from) {
-    std::copy_n(from + whole, rest, padded.begin() + static_cast<std::ptrdiff_t>(index * lanes));
-    return padded.data() + index * lanes;
-  };
-  for (size_t p = 0; p < plane_count; ++p) {
-    planes[p] = pad(p, input.planes[p]);
-  }
-  KernelInput tail{.planes = planes.data(), .count = lanes};
-  if (input.x_mm != nullptr) {
-    tail.x_mm = pad(plane_count, input.x_mm);
-    tail.y_mm = pad(plane_count + 1, input.y_mm);
-  }
-  std::vector<uint8_t> bytes(3 * lanes, 0);
-  std::fill_n(bytes.begin(), rest, uint8_t{1});
-  if (input.mask != nullptr) {
-    std::copy_n(input.mask + whole, rest, bytes.begin());
-  }
-  tail.mask = bytes.data();
-  std::vector<float> results(7 * lanes);
-  const auto result = [&](size_t index) { return results.data() + index * lanes; };
-  solve(tail, 0,
-        KernelOutput{{result(0), result(1), result(2)},
-                     {result(3), result(4), result(5)},
-                     result(6),
-                     bytes.data() + lanes,
-                     bytes.data() + 2 * lanes});
-  for (size_t c = 0; c < 3; ++c) {
-    std::copy_n(result(c), rest, output.normal[c] + whole);
-    std::copy_n(result(3 + c), rest, output.albedo[c] + whole);
-  }
-  std::copy_n(result(6), rest, output.residual + whole);
-  std::copy_n(bytes.data() + lanes, rest, output.samples + whole);
-  std::copy_n(bytes.data() + 2 * lanes, rest, output.reason + whole);
 }
 
 void SolveSpanImpl(const KernelParams& params, const KernelInput& input,

@@ -21,6 +21,7 @@ using Pieces = std::set<std::pair<int, int>>;
 class CountingProgress : public Progress {
  public:
   void BeginStage(std::string_view /*name*/, int /*total*/) override {}
+  void Clear() override {}
   void Advance(int steps) override { sum += steps; }
 
   std::atomic<int> sum = 0;

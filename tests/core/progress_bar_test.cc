@@ -57,6 +57,18 @@ class Terminal {
   std::string text_;
 };
 
+TEST(ProgressBar, DrawsNothingAfterClearUntilTheNextStage) {
+  Terminal terminal;
+  ProgressBar bar(terminal.Fd());
+  bar.BeginStage("solving", 2);
+
+  bar.Clear();
+  std::this_thread::sleep_for(std::chrono::milliseconds(110));  // so that it may draw again
+  bar.Advance(1);
+
+  EXPECT_THAT(terminal.Text(), EndsWith("\r"));  // the cleared line is the last that was written
+}
+
 TEST(ProgressBar, DrawsOnATerminalAndClearsItsLine) {
   Terminal terminal;
   {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <random>
+#include <utility>
 #include <vector>
 
 #include "imaging/raw.h"
@@ -90,6 +91,17 @@ TEST(Demosaic, SpreadsOneSiteToItsNeighboursOnly) {
   EXPECT_EQ(rgb[0].At(5, 3), 0.25F);
   EXPECT_EQ(sum, 4.0);
   EXPECT_EQ(*std::ranges::max_element(rgb[1].pixels), 0.0F);
+}
+
+TEST(Demosaic, SpreadsOneGreenSiteToFourNeighbours) {
+  RawMosaic mosaic = Mosaic({8, 8}, {0, 1, 1, 2}, [](int, int, int) { return 0.0F; });
+  mosaic.samples.At(4, 3) = 1.0F;
+  const Image3 rgb = Demosaic(mosaic);
+  for (const auto& [x, y] : {std::pair{3, 3}, {5, 3}, {4, 2}, {4, 4}}) {
+    EXPECT_EQ(rgb[1].At(x, y), 0.25F) << x << ' ' << y;
+  }
+  EXPECT_EQ(std::ranges::count(rgb[1].pixels, 0.0F), 64 - 5);
+  EXPECT_EQ(*std::ranges::max_element(rgb[0].pixels), 0.0F);
 }
 
 float MedianAround(const Image<float>& plane, int x, int y) {

@@ -64,7 +64,8 @@ struct DngSpec {
   std::vector<uint32_t> cfa = {0, 1, 1, 2};
   uint32_t cfa_side = 2;
   uint32_t colours = 1;                 // 3 writes a linear DNG
-  std::vector<uint32_t> black = {100};  // 1 or 4 values
+  std::vector<uint32_t> black = {100};  // row by row, `black_columns` in a row
+  uint32_t black_columns = 1;
   uint32_t white = 4000;
   std::vector<uint32_t> active_area = {};  // top, left, bottom, right
   bool with_exposure = true;
@@ -109,11 +110,13 @@ inline std::string DngBytes(const DngSpec& spec) {
   }
   entries.push_back({50706, 1, {1, 4, 0, 0}});
   entries.push_back({50708, 2, Text("Sateen Test Camera")});
-  const uint32_t black_side = spec.black.size() == 4 ? 2 : 1;
-  entries.push_back({50713, 3, {black_side, black_side}});
+  entries.push_back(
+      {50713,
+       3,
+       {static_cast<uint32_t>(spec.black.size()) / spec.black_columns, spec.black_columns}});
   entries.push_back({50714, 4, spec.black});
   entries.push_back({50717, 4, {spec.white}});
-  entries.push_back({50728, 5, {1, 2, 1, 1, 4, 5}});  // neutral 0.5, 1, 0.8
+  entries.push_back({50728, 5, {1, 4, 1, 2, 2, 5}});  // neutral 0.25, 0.5, 0.4
   if (!spec.active_area.empty()) {
     entries.push_back({50829, 4, spec.active_area});
   }

@@ -51,6 +51,7 @@ TEST(ReadRawMosaic, GivesEverySiteAsAFractionBetweenBlackAndWhite) {
 TEST(ReadRawMosaic, TakesBlackSiteBySite) {
   DngSpec spec;
   spec.black = {100, 200, 300, 500};
+  spec.black_columns = 2;
   const Result<RawMosaic> mosaic = ReadDng(spec);
   ASSERT_TRUE(mosaic) << mosaic.error().message;
   EXPECT_EQ(mosaic->black, 275.0F);
@@ -63,9 +64,27 @@ TEST(ReadRawMosaic, TakesBlackSiteBySite) {
   }
 }
 
+TEST(ReadRawMosaic, TakesBlackRowByRowAndColumnByColumn) {
+  const auto expected = [](int x, int y, float black) {
+    const float reading = Reading(static_cast<uint32_t>(x), static_cast<uint32_t>(y));
+    return (reading - black) / (4000.0F - black);
+  };
+  DngSpec spec;
+  spec.black = {100, 300};
+  for (const uint32_t columns : {1U, 2U}) {
+    spec.black_columns = columns;
+    const Result<RawMosaic> mosaic = ReadDng(spec);
+    ASSERT_TRUE(mosaic) << mosaic.error().message;
+    EXPECT_EQ(mosaic->black, 200.0F);
+    EXPECT_EQ(mosaic->samples.At(7, 8), expected(7, 8, columns == 1 ? 100.0F : 300.0F));
+    EXPECT_EQ(mosaic->samples.At(8, 7), expected(8, 7, columns == 1 ? 300.0F : 100.0F));
+  }
+}
+
 TEST(ReadRawMosaic, CountsSitesFromTheVisibleOrigin) {
   DngSpec spec;
   spec.active_area = {4, 6, 48, 62};
+  spec.black_columns = 2;
   spec.black = {100, 200, 300, 500};  // DNG: the pattern starts at the active area's corner
   const Result<RawMosaic> mosaic = ReadDng(spec);
   ASSERT_TRUE(mosaic) << mosaic.error().message;

@@ -115,6 +115,18 @@ TEST(RayOfPixel, NothingFromTheImageBehindAFold) {
   EXPECT_FALSE(RayOfPixel(camera, 1620, 1000));
 }
 
+TEST(RayOfPixel, ReachesTheFoldOfTangentialDistortion) {
+  // On the axes x' = x + 3 p2 x^2 and y' = y + 3 p1 y^2: with 0.5, least at -1/3, where it is -1/6.
+  // So close to that, only a step by the right derivative arrives.
+  Camera camera = OverheadCamera({2001, 2001}, 1000, 2001);
+  camera.distortion = {0, 0, 0, 0.5, 0};
+  EXPECT_TRUE(RayOfPixel(camera, 1000 - 166.66, 1000));
+  EXPECT_FALSE(RayOfPixel(camera, 1000 - 166.67, 1000));
+  camera.distortion = {0, 0, 0.5, 0, 0};
+  EXPECT_TRUE(RayOfPixel(camera, 1000, 1000 - 166.66));
+  EXPECT_FALSE(RayOfPixel(camera, 1000, 1000 - 166.67));
+}
+
 // Any lens, also such that a plain Newton iteration would leave its invertible part.
 TEST(RayOfPixel, InvertsRandomLensesUpToTheirFold) {
   std::mt19937 random(/*seed=*/1);

@@ -105,6 +105,7 @@ TEST(RigToJson, RoundTripsToTheLastBit) {
   Json file = FullRig();
   const double third = 1.0 / 3.0;
   file["lights"][0]["direction"] = {0.5774, 0.5773, 0.5774};  // normalised on reading
+  file["lights"][2]["axis"] = {0, -0.6001, -0.8};
   file["lights"][1]["flux_rgb"] = {third, std::numbers::pi, 1e-300};
   file["camera"]["table_from_camera"][5] = -0.8000001;  // made orthonormal on reading
 
@@ -114,6 +115,7 @@ TEST(RigToJson, RoundTripsToTheLastBit) {
   EXPECT_EQ(RigToJson(rig), once);
   EXPECT_EQ(rig.lights[1].flux_rgb, Eigen::Vector3d(third, std::numbers::pi, 1e-300));
   EXPECT_NEAR(rig.lights[0].direction.norm(), 1.0, 1e-15);
+  EXPECT_NEAR(rig.lights[2].axis.norm(), 1.0, 1e-15);
   const Eigen::Matrix3d r = rig.camera->table_from_camera.linear();
   EXPECT_LT((r.transpose() * r - Eigen::Matrix3d::Identity()).norm(), 1e-14);
 }

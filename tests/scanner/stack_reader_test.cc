@@ -163,6 +163,7 @@ class CountingProgress : public Progress {
     stage = name;
     left = total;
   }
+  void Clear() override {}
   void Advance(int steps) override { left -= steps; }
 
   std::string stage;
