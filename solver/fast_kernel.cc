@@ -333,11 +333,6 @@ HWY_INLINE VI ReasonOf(const Gathered& gathered, M enough, M accepted) {
   return hn::IfThenElse(bits(enough), with_samples, short_of_samples);
 }
 
-HWY_INLINE void StoreBytes(VI values, uint8_t* to) {
-  const hn::Rebind<uint8_t, D> du8;
-  hn::StoreU(hn::DemoteTo(du8, values), du8, to);
-}
-
 template <bool kDistant>
 HWY_INLINE void SolveVector(const KernelParams& params, const KernelInput& input, size_t offset,
                             const KernelOutput& output, State& state) {

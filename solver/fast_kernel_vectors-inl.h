@@ -49,6 +49,11 @@ HWY_INLINE V Dot(const Vector3& a, const Vector3& b) {
   return hn::MulAdd(a.x, b.x, hn::MulAdd(a.y, b.y, hn::Mul(a.z, b.z)));
 }
 
+HWY_INLINE void StoreBytes(VI values, uint8_t* to) {
+  const hn::Rebind<uint8_t, D> du8;
+  hn::StoreU(hn::DemoteTo(du8, values), du8, to);
+}
+
 // ---- Radiance far from 1 -----------------------------------------------------------------------
 
 constexpr float kTwoTo40 = 1.099511627776e12F;

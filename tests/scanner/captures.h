@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 
 #include <filesystem>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -112,6 +113,16 @@ inline void WriteSession(const std::filesystem::path& dir, const Session& sessio
     value += 0.1F;
   }
   WriteFlat(dir / "frames" / "dark.exr", 0.05F);
+}
+
+// The capture; ends the test with the message where it cannot be read.
+inline Capture MustRead(const std::filesystem::path& path, const ReadCaptureOptions& options = {},
+                        const Task& task = {}) {
+  Result<Capture> capture = ReadCapture(path, options, task);
+  if (!capture) {
+    throw std::runtime_error(capture.error().message);
+  }
+  return *std::move(capture);
 }
 
 // The error that reading gives; fails the test where it gives none.

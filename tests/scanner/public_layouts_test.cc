@@ -12,16 +12,11 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using testing::IsError;
 using testing::Lines;
+using testing::MustRead;
 using ::testing::SizeIs;
 using testing::TempFolder;
 using testing::WriteFlat;
 using testing::WriteText;
-
-Capture MustRead(const fs::path& path) {
-  Result<Capture> capture = ReadCapture(path, {});
-  EXPECT_TRUE(capture) << capture.error().message;
-  return capture ? *std::move(capture) : Capture{};
-}
 
 void ExpectFourFrames(const Capture& capture) {
   ASSERT_THAT(capture.stack, SizeIs(4));

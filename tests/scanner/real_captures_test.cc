@@ -11,13 +11,8 @@ namespace fs = std::filesystem;
 using testing::DataDir;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using testing::MustRead;
 using ::testing::SizeIs;
-
-Capture MustRead(const fs::path& path, const ReadCaptureOptions& options = {}) {
-  Result<Capture> capture = ReadCapture(path, options);
-  EXPECT_TRUE(capture) << capture.error().message;
-  return capture ? *std::move(capture) : Capture{};
-}
 
 auto PixelsIn(const Mask& mask) {
   return std::count_if(mask.pixels.begin(), mask.pixels.end(), [](uint8_t m) { return m != 0; });

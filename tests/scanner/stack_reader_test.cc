@@ -29,9 +29,7 @@ class StackReader : public ::testing::Test {
     EXPECT_TRUE(WriteExr(dir_ / "normal_gt.exr", testing::LevelNormals()));
   }
   Capture MustRead(const ReadCaptureOptions& options = {}, const Task& task = {}) {
-    Result<Capture> capture = ReadCapture(dir_, options, task);
-    EXPECT_TRUE(capture) << capture.error().message;
-    return capture ? *std::move(capture) : Capture{};
+    return testing::MustRead(dir_, options, task);
   }
 
   TempFolder temp_;
