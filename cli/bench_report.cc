@@ -8,19 +8,16 @@
 namespace sateen::cli {
 namespace {
 
-// Errors below this are shown as this: the rounding of a float normal.
-constexpr double kLeastErrorDeg = 1e-6;
-
-// A logarithmic axis of the plot.
+// A logarithmic axis of the plot, from one power of ten to another.
 struct LogAxis {
-  double from;   // value at `begin`
-  double to;     // value at `end`
+  int first;     // exponent at `begin`
+  int last;      // exponent at `end`
   double begin;  // [px]
   double end;    // [px]
 
   [[nodiscard]] double At(double value) const {
-    const double t = std::log10(std::clamp(value, from, to) / from) / std::log10(to / from);
-    return begin + t * (end - begin);
+    const double exponent = std::clamp<double>(std::log10(value), first, last);
+    return begin + (exponent - first) / (last - first) * (end - begin);
   }
 };
 
@@ -53,11 +50,13 @@ std::string Line(double x1, double y1, double x2, double y2, std::string_view st
 std::string Grid(const LogAxis& x, const LogAxis& y) {
   constexpr std::string_view kGridStyle = "stroke=\"#dddddd\"";
   std::string svg;
-  for (double value = x.from; value <= x.to * 1.001; value *= 10.0) {
+  for (int exponent = x.first; exponent <= x.last; ++exponent) {
+    const double value = std::pow(10.0, exponent);
     svg += Line(x.At(value), y.begin, x.At(value), y.end, kGridStyle);
     svg += Text(x.At(value), y.begin + 18.0, "middle", fmt::format("{:g}", value));
   }
-  for (double value = y.from; value <= y.to * 1.001; value *= 10.0) {
+  for (int exponent = y.first; exponent <= y.last; ++exponent) {
+    const double value = std::pow(10.0, exponent);
     svg += Line(x.begin, y.At(value), x.end, y.At(value), kGridStyle);
     svg += Text(x.begin - 8.0, y.At(value) + 4.0, "end", fmt::format("{:g}", value));
   }
@@ -71,7 +70,7 @@ std::string Marks(const BenchReport& report, const LogAxis& x, const LogAxis& y)
       continue;
     }
     const double px = x.At(row.ns_per_pixel);
-    const double py = y.At(std::max(row.angular_error_deg.mean, kLeastErrorDeg));
+    const double py = y.At(row.angular_error_deg.mean);
     const std::string color = ColorOf(row.case_name);
     svg +=
         fmt::format("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"5\" fill=\"{}\"/>\n", px, py, color);
@@ -140,8 +139,8 @@ std::string TextReport(const BenchReport& report) {
 }
 
 std::string SvgPlot(const BenchReport& report) {
-  const LogAxis x{1.0, 10000.0, 70.0, 660.0};
-  const LogAxis y{kLeastErrorDeg, 10.0, 400.0, 40.0};
+  const LogAxis x{0, 4, 70.0, 660.0};
+  const LogAxis y{-7, 1, 400.0, 40.0};
   const BenchFloor& floor = report.floors.back();
   std::string svg =
       "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"700\" height=\"460\" "

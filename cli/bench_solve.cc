@@ -5,11 +5,11 @@
 #include <chrono>
 #include <functional>
 #include <limits>
-#include <numbers>
 #include <ostream>
 #include <utility>
 
 #include "cli/bench_report.h"
+#include "core/angle.h"
 #include "core/output_folder.h"
 #include "simulation/relief.h"
 #include "simulation/rigs.h"
@@ -18,7 +18,6 @@
 namespace sateen::cli {
 namespace {
 
-constexpr double kRadPerDeg = std::numbers::pi / 180.0;
 constexpr float kSubnormal = 1e-40F;
 constexpr std::array kBackends = {Backend::kJacobiSvd, Backend::kQr, Backend::kLdlt, Backend::kFast,
                                   Backend::kAuto};

@@ -1,9 +1,9 @@
 #include "cli/simulate.h"
 
-#include <numbers>
 #include <ostream>
 #include <utility>
 
+#include "core/angle.h"
 #include "core/json.h"
 #include "core/output_folder.h"
 #include "core/sha256.h"
@@ -14,8 +14,6 @@
 
 namespace sateen::cli {
 namespace {
-
-constexpr double kRadPerDeg = std::numbers::pi / 180.0;
 
 struct SceneFile {
   ReliefScene scene;

@@ -107,7 +107,7 @@ Status Collect(std::vector<Result<LoadedFrame>>& frames, LoadedFrames& result) {
     }
     result.stack.push_back(std::move(loaded->frame));
     const LightFrame& frame = result.stack.back();
-    if (const Status status = CheckSize(frame.name, frame.rgb.Size(), result.stack[0].rgb.Size());
+    if (Status status = CheckSize(frame.name, frame.rgb.Size(), result.stack[0].rgb.Size());
         !status) {
       return status;
     }

@@ -25,6 +25,7 @@ Enum ReadName(JsonReader& json, std::string_view key, const std::array<Enum, N>&
   const auto match =
       std::find_if(values.begin(), values.end(), [&](Enum v) { return Name(v) == found; });
   std::vector<std::string_view> names;
+  names.reserve(N);
   for (const Enum value : values) {
     names.push_back(Name(value));
   }

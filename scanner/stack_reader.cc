@@ -153,7 +153,7 @@ Status ReadMaskInto(const CapturePlan& plan, Capture& capture) {
   if (!mask) {
     return tl::unexpected(mask.error());
   }
-  if (const Status status = CheckSize(name, mask->Size(), capture.stack[0].rgb.Size()); !status) {
+  if (Status status = CheckSize(name, mask->Size(), capture.stack[0].rgb.Size()); !status) {
     if (plan.mask_is_shared) {
       capture.warnings.push_back("the mask was left out: " + status.error().message);
       return {};
@@ -196,7 +196,7 @@ Status CheckCamera(const Capture& capture) {
 // Mask and truth, which must fit the frames.
 Status AddCompanions(const CapturePlan& plan, Capture& capture) {
   if (plan.mask) {
-    if (const Status status = ReadMaskInto(plan, capture); !status) {
+    if (Status status = ReadMaskInto(plan, capture); !status) {
       return status;
     }
   }

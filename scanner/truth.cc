@@ -101,7 +101,9 @@ Status CheckNormals(const Image3& normal, const fs::path& path) {
     for (int x = 0; x < normal.Size().width; ++x) {
       // Not std::hypot: with three arguments, libstdc++'s can make 0 of a NaN.
       const double length =
-          Eigen::Vector3d(normal[0].At(x, y), normal[1].At(x, y), normal[2].At(x, y)).norm();
+          Eigen::Vector3f(normal[0].At(x, y), normal[1].At(x, y), normal[2].At(x, y))
+              .cast<double>()
+              .norm();
       if (length != 0.0 && !(std::abs(length - 1.0) <= kUnitTolerance)) {
         return Fail(ErrorCode::kBadData,
                     "{}: the normal at column {}, row {} has length {:.6g}; need 1, or 0 where it "

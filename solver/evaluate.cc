@@ -3,14 +3,13 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <numeric>
 #include <vector>
 
+#include "core/angle.h"
+
 namespace sateen {
 namespace {
-
-constexpr double kDegPerRad = 180.0 / std::numbers::pi;
 
 Status CheckSize(const NormalField& field, const Image3& truth, const char* what) {
   const ImageSize found = truth.Size();

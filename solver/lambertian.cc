@@ -141,7 +141,7 @@ Status SolveAllRows(const LightStack& stack, const Rig& rig, const std::optional
   const bool fast = options.backend == Backend::kFast || options.backend == Backend::kAuto;
   std::vector<int64_t> refused(static_cast<size_t>(size.height), 0);
   task.BeginStage("solving", size.height);
-  const Status status = ParallelFor(size.height, RowsPerPiece(size), task, [&](int begin, int end) {
+  Status status = ParallelFor(size.height, RowsPerPiece(size), task, [&](int begin, int end) {
     if (fast) {
       fast_rows.Solve(begin, end, field);
       refused[static_cast<size_t>(begin)] = CountPending(begin, end, field);

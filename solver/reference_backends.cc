@@ -30,7 +30,7 @@ struct JacobiSvd {
 // The condition number from the eigenvalues of L^T L, exact enough below 1e7.
 double ConditionOf(const Eigen::Matrix3d& normal_matrix) {
   Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(normal_matrix, Eigen::EigenvaluesOnly);
-  const Eigen::Vector3d lambda = eigen.eigenvalues();
+  const Eigen::Vector3d& lambda = eigen.eigenvalues();
   return lambda[0] > 0.0 ? std::sqrt(lambda[2] / lambda[0])
                          : std::numeric_limits<double>::infinity();
 }

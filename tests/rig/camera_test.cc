@@ -7,6 +7,7 @@
 #include <numbers>
 #include <random>
 
+#include "core/angle.h"
 #include "rig/table_grid.h"
 
 namespace sateen {
@@ -14,14 +15,13 @@ namespace {
 
 using ::testing::HasSubstr;
 
-constexpr double kDegToRad = std::numbers::pi / 180.0;
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
 // A strong wide-angle lens, 53 degrees across, tilted and turned over the table.
 Camera TiltedCamera(ImageSize size_px) {
   Camera camera = OverheadCamera(size_px, /*distance_mm=*/500, /*width_mm=*/500);
   camera.distortion = {-0.3, 0.1, 1e-3, -5e-4, 0.0};
-  const Eigen::AngleAxisd tilt(20 * kDegToRad, Eigen::Vector3d(0.8, 0.6, 0.0));
+  const Eigen::AngleAxisd tilt(20 * kRadPerDeg, Eigen::Vector3d(0.8, 0.6, 0.0));
   camera.table_from_camera = tilt * camera.table_from_camera;
   return camera;
 }
@@ -158,7 +158,7 @@ TEST(RayOfPixel, InvertsRandomLensesUpToTheirFold) {
 
 TEST(TablePointOfPixel, NothingWhereTheRayMissesTheTable) {
   Camera camera = OverheadCamera({101, 101}, 500, 1000);
-  const Eigen::AngleAxisd to_horizon(80 * kDegToRad, Eigen::Vector3d::UnitX());
+  const Eigen::AngleAxisd to_horizon(80 * kRadPerDeg, Eigen::Vector3d::UnitX());
   camera.table_from_camera.linear() = to_horizon * camera.table_from_camera.linear();
   EXPECT_TRUE(TablePointOfPixel(camera, 50, 50));  // 10 degrees below the horizon
   EXPECT_FALSE(TablePointOfPixel(camera, 50, 0));  // 45 degrees further up
@@ -227,7 +227,7 @@ TEST(TableGrid, AffineViewsAreExactButForRounding) {
 
 TEST(TableGrid, CameraThatSeesPastTheTableIsRefused) {
   Camera camera = OverheadCamera({101, 101}, 500, 1000);
-  const Eigen::AngleAxisd to_horizon(80 * kDegToRad, Eigen::Vector3d::UnitX());
+  const Eigen::AngleAxisd to_horizon(80 * kRadPerDeg, Eigen::Vector3d::UnitX());
   camera.table_from_camera.linear() = to_horizon * camera.table_from_camera.linear();
   const Result<TableGrid> grid = TableGrid::Make(camera);
   ASSERT_FALSE(grid);

@@ -4,16 +4,14 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <numbers>
 
+#include "core/angle.h"
 #include "simulation/rigs.h"
 
 namespace sateen {
 namespace {
 
 using ::testing::HasSubstr;
-
-constexpr double kRadPerDeg = std::numbers::pi / 180.0;
 
 TEST(RenderRelief, FlatUnderOneNearLightFollowsTheInverseSquare) {
   Rig rig = RingRig({5, 5});

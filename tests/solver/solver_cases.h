@@ -7,6 +7,7 @@
 #include <numbers>
 #include <vector>
 
+#include "core/angle.h"
 #include "imaging/light_stack.h"
 #include "rig/light.h"
 #include "simulation/relief.h"
@@ -17,8 +18,6 @@
 // Stacks with known answers for the tests of the solver.
 namespace sateen::testing {
 
-inline constexpr double kRadPerDeg = std::numbers::pi / 180.0;
-inline constexpr double kDegPerRad = 180.0 / std::numbers::pi;
 // Half the distance from 1 to the next float: the largest relative error of a rounded sample.
 inline constexpr double kFloatUnit = 0x1p-24;
 

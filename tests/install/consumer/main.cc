@@ -26,8 +26,7 @@ int main() {
   const sateen::Image3& n = field->normal;
   for (int y = 0; y < 2; ++y) {
     for (int x = 0; x < 2; ++x) {
-      const float error =
-          std::hypot(n[0].At(x, y), n[1].At(x, y), n[2].At(x, y) - 1.0F);
+      const float error = std::hypot(n[0].At(x, y), n[1].At(x, y), n[2].At(x, y) - 1.0F);
       if (!(error < 1e-5F)) {
         std::cerr << "pixel " << x << ", " << y << ": the normal is off by " << error << '\n';
         return 1;
