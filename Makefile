@@ -28,7 +28,8 @@ build: setup  ## Build everything into build/release
 test: build  ## Build and run all tests
 	@$(CTEST) --test-dir build/release
 
-bench: build  ## Run the micro-benchmarks
+bench: build  ## Speed against error of the whole solve, then the micro-benchmarks
+	@build/release/bin/sateen bench solve
 	@for program in build/release/bin/*_bench; do echo "== $$program"; $$program || exit 1; done
 
 format: setup  ## Format all sources in place
@@ -46,10 +47,14 @@ asan: setup  ## All tests under the address and undefined-behaviour sanitizers
 	@cmake --build --preset asan -j$(JOBS)
 	@UBSAN_OPTIONS=print_stacktrace=1 $(CTEST) --test-dir build/asan
 
-tsan: setup  ## All tests under the thread sanitizer
+# Where threads are: the others would only take time.
+TSAN_TESTS = sateen_core_parallel_test sateen_core_progress_bar_test sateen_solver_lambertian_test \
+             sateen_scanner_stack_reader_test
+tsan: setup  ## The tests of what runs on several threads, under the thread sanitizer
 	@cmake --preset tsan --log-level=WARNING
-	@cmake --build --preset tsan -j$(JOBS)
-	@TSAN_OPTIONS="suppressions=$(CURDIR)/tests/tsan.supp" $(CTEST) --test-dir build/tsan
+	@cmake --build --preset tsan -j$(JOBS) --target $(TSAN_TESTS)
+	@TSAN_OPTIONS="suppressions=$(CURDIR)/tests/tsan.supp" $(CTEST) --test-dir build/tsan \
+	    -R '^(core/parallel|core/progress_bar|solver/lambertian|scanner/stack_reader)_test$$'
 
 clean:  ## Remove build/
 	@rm -rf build

@@ -39,7 +39,10 @@ void CountPixels(benchmark::State& state, size_t pixels) {
       benchmark::Counter::kIsIterationInvariantRate | benchmark::Counter::kInvert);
 }
 
-void BM_SolveRows(benchmark::State& state, LightModel model, float radiance_factor) {
+using RowsFunction = void (FastRows::*)(int, int, NormalField&) const;
+
+void BM_Rows(benchmark::State& state, RowsFunction function, LightModel model,
+             float radiance_factor) {
   const Scene scene = MakeScene(model, radiance_factor);
   const std::optional<Mask> no_mask;
   const FastRows rows = FastRows::Make(scene.relief.stack, scene.rig, no_mask, {}).value();
@@ -48,33 +51,17 @@ void BM_SolveRows(benchmark::State& state, LightModel model, float radiance_fact
   const int step = RowsPerPiece(kSize);
   for (auto _ : state) {
     for (int row = 0; row < kSize.height; row += step) {
-      rows.Solve(row, row + step, field);
+      (rows.*function)(row, row + step, field);
     }
     benchmark::DoNotOptimize(field.normal[0].pixels.data());
   }
   CountPixels(state, kSize.PixelCount());
 }
-BENCHMARK_CAPTURE(BM_SolveRows, distant, LightModel::kDistant, 1.0F);
-BENCHMARK_CAPTURE(BM_SolveRows, near, LightModel::kNear, 1.0F);
-BENCHMARK_CAPTURE(BM_SolveRows, near_subnormal, LightModel::kNear, 1e-40F);
-BENCHMARK_CAPTURE(BM_SolveRows, led, LightModel::kLed, 1.0F);
-
-void BM_TouchRows(benchmark::State& state) {
-  const Scene scene = MakeScene(LightModel::kNear, 1.0F);
-  const std::optional<Mask> no_mask;
-  const FastRows rows = FastRows::Make(scene.relief.stack, scene.rig, no_mask, {}).value();
-  NormalField field;
-  field.Resize(kSize);
-  const int step = RowsPerPiece(kSize);
-  for (auto _ : state) {
-    for (int row = 0; row < kSize.height; row += step) {
-      rows.Touch(row, row + step, field);
-    }
-    benchmark::DoNotOptimize(field.normal[0].pixels.data());
-  }
-  CountPixels(state, kSize.PixelCount());
-}
-BENCHMARK(BM_TouchRows);
+BENCHMARK_CAPTURE(BM_Rows, touch, &FastRows::Touch, LightModel::kNear, 1.0F);
+BENCHMARK_CAPTURE(BM_Rows, distant, &FastRows::Solve, LightModel::kDistant, 1.0F);
+BENCHMARK_CAPTURE(BM_Rows, near, &FastRows::Solve, LightModel::kNear, 1.0F);
+BENCHMARK_CAPTURE(BM_Rows, near_subnormal, &FastRows::Solve, LightModel::kNear, 1e-40F);
+BENCHMARK_CAPTURE(BM_Rows, led, &FastRows::Solve, LightModel::kLed, 1.0F);
 
 void BM_TablePositions(benchmark::State& state) {
   const Rig rig = RingRig(kSize);

@@ -66,7 +66,7 @@ std::string Grid(const LogAxis& x, const LogAxis& y) {
 std::string Marks(const BenchReport& report, const LogAxis& x, const LogAxis& y) {
   std::string svg;
   for (const BenchRow& row : report.rows) {
-    if (row.threads != report.floors.back().threads) {
+    if (row.threads != report.floors.back().threads || row.angular_error_deg.count == 0) {
       continue;
     }
     const double px = x.At(row.ns_per_pixel);

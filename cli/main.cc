@@ -13,6 +13,7 @@ namespace {
 
 constexpr int kInternal = 1;
 constexpr int kUsage = 2;
+constexpr int kInputOutput = 4;
 
 int Run(int argc, char** argv) {
   CLI::App app("Photometric-stereo scanner: from frames to normal and albedo maps", "sateen");
@@ -37,13 +38,19 @@ int Run(int argc, char** argv) {
   sateen::InstallInterruptHandlers();
   sateen::ProgressBar progress(2);
   const sateen::Task task{.progress = &progress, .cancel = &sateen::InterruptFlag()};
+  int status = 0;
   if (app.got_subcommand("solve")) {
-    return RunSolve(solve, task, std::cout, std::cerr);
+    status = RunSolve(solve, task, std::cout, std::cerr);
+  } else if (app.got_subcommand("simulate")) {
+    status = RunSimulate(simulate, task, std::cout, std::cerr);
+  } else {
+    status = RunBenchSolve(bench_solve, task, std::cout, std::cerr);
   }
-  if (app.got_subcommand("simulate")) {
-    return RunSimulate(simulate, task, std::cout, std::cerr);
+  if (status == 0 && !std::cout.flush()) {
+    std::cerr << "sateen: error: standard output cannot be written; is the disk full?\n";
+    return kInputOutput;
   }
-  return RunBenchSolve(bench_solve, task, std::cout, std::cerr);
+  return status;
 }
 
 }  // namespace

@@ -68,6 +68,8 @@ Status StageMaps(const NormalField& field, const LightFrame& first_frame,
   then([&] { return WritePng8(folder.Stage("reason.png"), field.reason); });
   if (angular_error_deg) {
     then([&] { return WriteExr(folder.Stage("error.exr"), *angular_error_deg); });
+  } else {
+    folder.Retire("error.exr");
   }
   then([&] {
     return WritePng8(folder.Stage("overview.png"),

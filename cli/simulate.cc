@@ -28,7 +28,6 @@ Result<SceneFile> ReadScene(const std::filesystem::path& path) {
   }
   SceneFile file;
   JsonReader top(*json, path.string());
-  top.Ignore("schema");
   const std::string rig_file = top.String("rig");
   JsonReader surface = top.Object("surface");
   const std::string shape_name = surface.String("shape");

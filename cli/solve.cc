@@ -1,7 +1,7 @@
 #include "cli/solve.h"
 
 #include <chrono>
-#include <map>
+#include <filesystem>
 #include <ostream>
 #include <utility>
 
@@ -48,7 +48,7 @@ Status Evaluate(SolveOutcome& outcome, std::optional<Image<float>>& error_map_de
   if (!angle) {
     return tl::unexpected(angle.error());
   }
-  if (angle->pixels == 0) {
+  if (angle->count == 0) {
     return {};
   }
   outcome.angular_error_deg = *angle;
@@ -59,6 +59,28 @@ Status Evaluate(SolveOutcome& outcome, std::optional<Image<float>>& error_map_de
       return tl::unexpected(albedo.error());
     }
     outcome.albedo_error = *albedo;
+  }
+  return {};
+}
+
+// What the formats can say and this solver does not do, or must not.
+Status CheckSupported(const SolveArgs& args, Capture& capture) {
+  if (capture.session && capture.session->table_from_sheet) {
+    return Fail(ErrorCode::kBadData,
+                "{}: the session has table_from_sheet, but solving a tilted sheet is not supported "
+                "yet; remove the key if the sheet lay on the table",
+                args.capture.string());
+  }
+  std::error_code ignored;  // a folder that does not exist yet is no other folder
+  if (std::filesystem::equivalent(args.capture, args.output, ignored)) {
+    return Fail(ErrorCode::kInvalidArgument,
+                "{}: is the capture itself; give a folder of its own for the maps",
+                args.output.string());
+  }
+  if (capture.rig.response && capture.rig.response->white_balance != Eigen::Vector3d::Ones()) {
+    capture.warnings.push_back(
+        "the rig's response.white_balance is not applied: colours are those of the frames and the "
+        "lights' flux_rgb");
   }
   return {};
 }
@@ -74,6 +96,9 @@ Result<SolveOutcome> SolveCapture(const SolveArgs& args, const Task& task, std::
   Result<Capture> capture = ReadCapture(args.capture, ReadOptionsOf(args), task);
   if (!capture) {
     return tl::unexpected(capture.error());
+  }
+  if (Status status = CheckSupported(args, *capture); !status) {
+    return tl::unexpected(status.error());
   }
   task.ClearProgress();
   for (const std::string& warning : capture->warnings) {

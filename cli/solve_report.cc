@@ -10,7 +10,7 @@ nlohmann::json ToJson(const ErrorStatistics& error) {
           {"median", error.median},
           {"p99", error.p99},
           {"max", error.max},
-          {"pixels", error.pixels}};
+          {"count", error.count}};
 }
 
 nlohmann::json OptionsToJson(const SolveArgs& args) {
@@ -40,12 +40,20 @@ std::string UnsolvedWords(const SolveSummary& summary) {
   return words;
 }
 
+// "auto (AVX3)", or "qr", which is not vectorised by us.
+std::string BackendWords(const SolveSummary& summary) {
+  return summary.instruction_set.empty()
+             ? std::string(Name(summary.backend))
+             : fmt::format("{} ({})", Name(summary.backend), summary.instruction_set);
+}
+
 }  // namespace
 
 std::string JsonReport(const SolveArgs& args, const SolveOutcome& outcome) {
   const SolveSummary& summary = outcome.field.summary;
   const ImageSize size = outcome.field.normal.Size();
   nlohmann::json report = {{"schema", "sateen.solve/1"},
+                           {"version", SATEEN_VERSION},
                            {"capture", args.capture.string()},
                            {"layout", outcome.capture.layout},
                            {"output", args.output.string()},
@@ -75,17 +83,17 @@ std::string JsonReport(const SolveArgs& args, const SolveOutcome& outcome) {
   if (outcome.albedo_error) {
     report["albedo_error"] = ToJson(*outcome.albedo_error);
   }
-  return report.dump();
+  // A path that is not UTF-8 must not end the run.
+  return report.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 
 std::string TextReport(const SolveArgs& args, const SolveOutcome& outcome) {
   const SolveSummary& summary = outcome.field.summary;
   const ImageSize size = outcome.field.normal.Size();
   std::string text = fmt::format(
-      "solved {} of {} pixels ({}x{} px, {} lights) in {:.3f} s, {} thread{}, backend {} ({})\n",
+      "solved {} of {} pixels ({}x{} px, {} lights) in {:.3f} s, {} thread{}, backend {}\n",
       summary.solved, summary.pixels, size.width, size.height, outcome.capture.stack.size(),
-      summary.seconds, summary.threads, summary.threads == 1 ? "" : "s", Name(summary.backend),
-      summary.instruction_set);
+      summary.seconds, summary.threads, summary.threads == 1 ? "" : "s", BackendWords(summary));
   if (const std::string words = UnsolvedWords(summary); !words.empty()) {
     text += fmt::format("unsolved: {} (see reason.png)\n", words);
   }

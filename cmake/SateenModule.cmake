@@ -27,12 +27,12 @@ function(sateen_add_module name)
   endif()
 endfunction()
 
-# sateen_install_module(<name>): the library and its headers go to other CMake projects.
+# sateen_install_module(<name> HEADERS ...): the library, and those of its headers that other CMake
+# projects may include.
 function(sateen_install_module name)
+  cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "HEADERS")
   install(TARGETS sateen_${name} EXPORT sateen-targets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
-  install(DIRECTORY ${PROJECT_SOURCE_DIR}/${name}/
-          DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/sateen/${name}
-          FILES_MATCHING PATTERN "*.h" PATTERN "*_kernel.h" EXCLUDE)
+  install(FILES ${arg_HEADERS} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/sateen/${name})
 endfunction()
 
 function(sateen_set_warnings target)

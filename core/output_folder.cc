@@ -109,9 +109,12 @@ class Moves {
 // Old files go to `aside`, the last name (the record) first; then the new ones come in, the record
 // last, so that at no moment it stands beside files that it does not describe.
 Status PutInPlace(const fs::path& from, const fs::path& to, const std::vector<std::string>& names,
-                  const std::vector<fs::path>& folders, Moves& moves) {
+                  const std::vector<std::string>& retired, const std::vector<fs::path>& folders,
+                  Moves& moves) {
   const fs::path aside = from / ".replaced";
-  for (auto name = names.rbegin(); name != names.rend(); ++name) {
+  std::vector<std::string> old = retired;
+  old.insert(old.end(), names.begin(), names.end());
+  for (auto name = old.rbegin(); name != old.rend(); ++name) {
     std::error_code ignored;  // Move() will fail and say so
     if (fs::symlink_status(to / *name, ignored).type() == fs::file_type::not_found) {
       continue;
@@ -157,7 +160,8 @@ OutputFolder::OutputFolder(OutputFolder&& other) noexcept
     : dir_(std::move(other.dir_)),
       staging_dir_(std::exchange(other.staging_dir_, {})),
       created_(std::exchange(other.created_, {})),
-      names_(std::exchange(other.names_, {})) {}
+      names_(std::exchange(other.names_, {})),
+      retired_(std::exchange(other.retired_, {})) {}
 
 OutputFolder::~OutputFolder() { Discard(); }
 
@@ -177,6 +181,8 @@ fs::path OutputFolder::Stage(const std::string& name) {
 Status OutputFolder::WriteText(const std::string& name, const std::string& text) {
   return WriteBytes(Stage(name), text, dir_ / name);
 }
+
+void OutputFolder::Retire(const std::string& name) { retired_.push_back(name); }
 
 Status OutputFolder::Commit() {
   SATEEN_CHECK(!staging_dir_.empty());
@@ -205,7 +211,7 @@ Status OutputFolder::Commit() {
   folders.erase(std::unique(folders.begin(), folders.end()), folders.end());
 
   Moves moves;
-  if (Status placed = PutInPlace(staging_dir_, dir_, names_, folders, moves); !placed) {
+  if (Status placed = PutInPlace(staging_dir_, dir_, names_, retired_, folders, moves); !placed) {
     if (!moves.TakeBack()) {  // what was there must not go with the staging folder
       placed.error().message += fmt::format("; the files that were there are kept in {}",
                                             std::exchange(staging_dir_, {}).string());

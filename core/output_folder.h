@@ -31,6 +31,8 @@ class OutputFolder {
   [[nodiscard]] std::filesystem::path Stage(const std::string& name);
   // Stages `name` with `text` as its content.
   [[nodiscard]] Status WriteText(const std::string& name, const std::string& text);
+  // Commit() takes away the file `name` of an earlier run, unless it is staged.
+  void Retire(const std::string& name);
   // kIo names the file that could not be flushed or put in place.
   [[nodiscard]] Status Commit();
 
@@ -44,6 +46,7 @@ class OutputFolder {
   std::filesystem::path staging_dir_;           // empty once committed, discarded or moved from
   std::vector<std::filesystem::path> created_;  // folders made by Open(), outermost first
   std::vector<std::string> names_;
+  std::vector<std::string> retired_;
 };
 
 // Replaces one file whole or not at all, keeping its permissions; its folder must exist.

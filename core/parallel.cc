@@ -1,6 +1,7 @@
 #include "core/parallel.h"
 
 #include <tbb/blocked_range.h>
+#include <tbb/global_control.h>
 #include <tbb/parallel_for.h>
 #include <tbb/partitioner.h>
 #include <tbb/task_arena.h>
@@ -24,6 +25,10 @@ Status ParallelFor(int count, int grain, const Task& task,
     body(begin, end);
     task.Advance(end - begin);
   };
+  // oneTBB would not go beyond the cores otherwise.
+  const tbb::global_control limit(
+      tbb::global_control::max_allowed_parallelism,
+      static_cast<size_t>(std::max(task.ThreadCount(), Task().ThreadCount())));
   tbb::task_arena arena(task.ThreadCount());
   arena.execute([&] {
     tbb::parallel_for(

@@ -7,6 +7,7 @@ namespace sateen {
 namespace {
 
 constexpr double kUnitTolerance = 1e-3;  // files often round unit vectors to four digits
+constexpr double kMaxAnisotropy = 50.0;  // irradiance halves 9.5 degrees off the axis
 constexpr double kReferenceDistanceMm = 1000.0;
 
 bool IsUnit(const Eigen::Vector3d& v) { return std::abs(v.norm() - 1.0) <= kUnitTolerance; }
@@ -43,8 +44,9 @@ Status Light::Validate(std::string_view what) const {
     return Fail(ErrorCode::kBadData, "{}: axis {} has length {:.6g}; need a unit vector", what,
                 Show(axis), axis.norm());
   }
-  if (model == LightModel::kLed && !(anisotropy >= 0.0 && anisotropy <= 100.0)) {
-    return Fail(ErrorCode::kBadData, "{}: anisotropy {:.6g}; need 0 to 100", what, anisotropy);
+  if (model == LightModel::kLed && !(anisotropy >= 0.0 && anisotropy <= kMaxAnisotropy)) {
+    return Fail(ErrorCode::kBadData, "{}: anisotropy {:.6g}; need 0 to {:g}", what, anisotropy,
+                kMaxAnisotropy);
   }
   if (!(flux_rgb.allFinite() && flux_rgb.minCoeff() > 0.0)) {
     return Fail(ErrorCode::kBadData, "{}: intensity {}; need three finite numbers > 0", what,
@@ -62,8 +64,8 @@ Incident IncidentAt(const Light& light, const Eigen::Vector3d& x_mm) {
   const double falloff = kReferenceDistanceMm / distance_mm;
   Incident incident{d / distance_mm, light.flux_rgb * (falloff * falloff)};  // (2)
   if (light.model == LightModel::kLed) {
-    const double cosine = std::max(0.0, -incident.l.dot(light.axis));
-    incident.e_rgb *= std::pow(cosine, light.anisotropy);  // (3)
+    const double cosine = -incident.l.dot(light.axis);
+    incident.e_rgb *= cosine > 0.0 ? std::pow(cosine, light.anisotropy) : 0.0;  // (3)
   }
   return incident;
 }

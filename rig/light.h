@@ -23,7 +23,7 @@ struct Light {
   Eigen::Vector3d direction = Eigen::Vector3d::UnitZ();
   // kNear, kLed: where the light is.
   Eigen::Vector3d position_mm = Eigen::Vector3d::Zero();
-  // kLed: unit vector along which it shines, and the exponent mu >= 0 of its angular fall-off.
+  // kLed: unit vector along which it shines, and the exponent mu, 0 to 50, of its angular fall-off.
   Eigen::Vector3d axis = -Eigen::Vector3d::UnitZ();
   double anisotropy = 0.0;
   // kDistant: irradiance; otherwise the irradiance at 1 m on the axis. Red, green, blue; > 0.
@@ -46,7 +46,7 @@ struct Incident {
 ///
 ///     distant   l constant,                e = phi                                        (1)
 ///     near      d = s - x, l = d / |d|,    e = phi (1000 mm / |d|)^2                      (2)
-///     led       as near, and               e = (2) * max(0, -l . a)^mu                    (3)
+///     led       as near, and               e = (2) * (-l . a)^mu, 0 where -l . a <= 0     (3)
 ///
 /// s = position_mm, a = axis, mu = anisotropy, phi = flux_rgb. x must not be s.
 [[nodiscard]] Incident IncidentAt(const Light& light, const Eigen::Vector3d& x_mm);

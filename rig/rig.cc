@@ -87,10 +87,20 @@ LightModel ReadModel(JsonReader& reader) {
   return LightModel::kDistant;
 }
 
+// Frames are named after their lights.
+bool IsFileName(const std::string& name) {
+  return !name.empty() && name != "." && name != ".." &&
+         std::none_of(name.begin(), name.end(),
+                      [](unsigned char c) { return c == '/' || c < 0x20 || c == 0x7f; });
+}
+
 Result<Light> ReadLight(JsonReader reader, const std::string& what) {
   Light light;
   light.name = reader.String("name");
-  reader.Require(!light.name.empty(), "name", "is empty; need a name");
+  reader.Require(IsFileName(light.name), "name",
+                 fmt::format("is \"{}\"; need a name that a frame's file can have, without / and "
+                             "control characters",
+                             light.name));
   light.channel = reader.Integer("channel");
   light.model = ReadModel(reader);
   reader.Require(!reader.Has("field"), "field",

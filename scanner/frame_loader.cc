@@ -9,6 +9,9 @@
 namespace sateen {
 namespace {
 
+constexpr float kWhite = 1.0F;  // the white level in a RawMosaic
+constexpr float kSaturatedSite = 8.0F;
+
 struct LoadedFrame {
   LightFrame frame;
   bool was_srgb = false;
@@ -19,8 +22,13 @@ Result<Photo> ReadPhotoOrRaw(const FrameFile& file, Encoding encoding) {
   if (!IsRawName(file.path)) {
     return ReadPhoto(file.path, encoding);
   }
-  return ReadRawMosaic(file.path).map([](const RawMosaic& mosaic) {
-    return Photo{Demosaic(mosaic), 1.0F, false};  // 1 is the white level
+  return ReadRawMosaic(file.path).map([](RawMosaic mosaic) {
+    // A saturated site must not pass as a mean of it and its neighbours: whatever pixel it has a
+    // part in, at least a quarter, comes out above the white level.
+    for (float& site : mosaic.samples.pixels) {
+      site = site >= kWhite ? kSaturatedSite : site;
+    }
+    return Photo{Demosaic(mosaic), kWhite, false};
   });
 }
 

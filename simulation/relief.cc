@@ -104,7 +104,7 @@ class RowRenderer {
   void RenderPixel(int column, int row, const Eigen::Vector3d& x_mm) const {
     const double u = (column - 0.5 * (size_.width - 1)) / half_;
     const double v = (0.5 * (size_.height - 1) - row) / half_;
-    // Rounded as the truth maps are, so that truth is exactly what was rendered.
+    // The albedo rounded as its map is; the normal must stay of unit length.
     const Eigen::Vector3d n = NormalAt(scene_, u, v, scene_.ripple_period_px / half_).normalized();
     const Eigen::Vector3d rho = AlbedoAt(scene_, u, v).cast<float>().cast<double>();
     const size_t pixel = out_.normal[0].Index(column, row);

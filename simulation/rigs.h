@@ -11,7 +11,7 @@ namespace sateen {
 // aimed at the table's origin; flux 1 gives irradiance 1 at 1 m.
 [[nodiscard]] Lights LedRing(LightModel model, int count, double polar_rad, double radius_mm);
 
-// The seed's scanner: ten LEDs on a hemisphere of 600 mm, camera 610 mm above the table that sees
+// The scanner of The Order: 1886: ten LEDs on a hemisphere of 600 mm, camera 610 mm above the table that sees
 // `width_mm` of it. flux_rgb is such that irradiance at the origin is 1.
 [[nodiscard]] Rig RingRig(ImageSize size_px, LightModel model = LightModel::kNear,
                           double width_mm = 200.0);

@@ -44,7 +44,7 @@ ErrorStatistics StatisticsOf(std::vector<double> errors) {
   }
   std::sort(errors.begin(), errors.end());
   const double sum = std::accumulate(errors.begin(), errors.end(), 0.0);
-  return {.pixels = static_cast<int64_t>(errors.size()),
+  return {.count = static_cast<int64_t>(errors.size()),
           .mean = sum / static_cast<double>(errors.size()),
           .median = Quantile(errors, 0.5),
           .p99 = Quantile(errors, 0.99),

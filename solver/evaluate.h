@@ -9,7 +9,7 @@
 namespace sateen {
 
 struct ErrorStatistics {
-  int64_t pixels = 0;  // compared; the other figures are 0 when none is
+  int64_t count = 0;  // values compared; the other figures are 0 when none is
   double mean = 0.0;
   double median = 0.0;
   double p99 = 0.0;

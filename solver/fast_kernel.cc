@@ -324,13 +324,24 @@ HWY_INLINE VI ReasonOf(const Gathered& gathered, M enough, M accepted) {
   const auto code = [&](Reason reason) { return hn::Set(di, static_cast<int32_t>(reason)); };
   const auto bits = [&](M mask) { return hn::RebindMask(di, mask); };
   const M some_saturated = hn::Gt(gathered.saturated, hn::Zero(d));
-  const VI short_of_samples = hn::IfThenElse(
-      bits(gathered.bright),
-      hn::IfThenElse(bits(some_saturated), code(Reason::kSaturated), code(Reason::kTooFewSamples)),
-      code(Reason::kDark));
+  const VI short_of_samples =
+      hn::IfThenElse(bits(some_saturated), code(Reason::kSaturated), code(Reason::kTooFewSamples));
   const VI with_samples =
       hn::IfThenElse(bits(accepted), code(Reason::kSolved), code(Reason::kIllConditioned));
-  return hn::IfThenElse(bits(enough), with_samples, short_of_samples);
+  const VI bright = hn::IfThenElse(bits(enough), with_samples, short_of_samples);
+  return hn::IfThenElse(bits(gathered.bright), bright, code(Reason::kDark));
+}
+
+// A vector wholly outside the mask.
+HWY_INLINE void StoreUnsolved(size_t offset, const KernelOutput& output) {
+  const D d;
+  for (size_t c = 0; c < 3; ++c) {
+    hn::StoreU(hn::Zero(d), d, output.normal[c] + offset);
+    hn::StoreU(hn::Zero(d), d, output.albedo[c] + offset);
+  }
+  hn::StoreU(hn::Zero(d), d, output.residual + offset);
+  StoreBytes(hn::Zero(DI()), output.samples + offset);
+  StoreBytes(hn::Set(DI(), static_cast<int32_t>(Reason::kOutsideMask)), output.reason + offset);
 }
 
 template <bool kDistant>
@@ -344,6 +355,10 @@ HWY_INLINE void SolveVector(const KernelParams& params, const KernelInput& input
     const hn::Rebind<uint8_t, D> du8;
     const VI mask = hn::PromoteTo(di, hn::LoadU(du8, input.mask + offset));
     inside = hn::RebindMask(d, hn::Ne(mask, hn::Zero(di)));
+  }
+  if (hn::AllFalse(d, inside)) {
+    StoreUnsolved(offset, output);
+    return;
   }
   const V x_mm = kDistant ? hn::Zero(d) : hn::LoadU(d, input.x_mm + offset);
   const V y_mm = kDistant ? hn::Zero(d) : hn::LoadU(d, input.y_mm + offset);
@@ -360,16 +375,14 @@ HWY_INLINE void SolveVector(const KernelParams& params, const KernelInput& input
   const Residual residual = ResidualOf<kDistant>(params, scratch, threshold, n);
   const Vector3 step = Times(inverse.a, residual.gradient);
   n = {hn::Add(n.x, step.x), hn::Add(n.y, step.y), hn::Add(n.z, step.z)};
-  // |i' - L (n + step)|^2 = |i' - L n|^2 - step . gradient, because A step = gradient.
-  const V sum_of_squares =
-      hn::Max(hn::Zero(d), hn::Sub(residual.sum_of_squares, Dot(step, residual.gradient)));
 
   const V squared = Dot(n, n);
   const M enough = hn::Ge(eq.count, hn::Set(d, 3.0F));
   const M finite = hn::And(hn::Gt(squared, hn::Zero(d)), hn::Lt(squared, hn::Set(d, 1e38F)));
   const M accepted = hn::And(inverse.accepted, finite);
-  const M solved = hn::And(inside, hn::And(enough, accepted));
+  const M solved = hn::And(hn::And(inside, gathered.bright), hn::And(enough, accepted));
   const V inverse_length = hn::Div(one, hn::Sqrt(hn::IfThenElse(solved, squared, one)));  // (4)
+  const V result_scale = hn::Set(d, params.result_scale);
   const auto store = [&](V value, float* to) {
     hn::StoreU(hn::IfThenElseZero(solved, value), d, to + offset);
   };
@@ -377,10 +390,11 @@ HWY_INLINE void SolveVector(const KernelParams& params, const KernelInput& input
   store(hn::Mul(n.y, inverse_length), output.normal[1]);
   store(hn::Mul(n.z, inverse_length), output.normal[2]);
   for (size_t c = 0; c < 3; ++c) {
-    store(ScaleDown(hn::Sqrt(Dot(n_rgb[c], n_rgb[c])), scale), output.albedo[c]);
+    store(ScaleDown(hn::Mul(hn::Sqrt(Dot(n_rgb[c], n_rgb[c])), result_scale), scale),
+          output.albedo[c]);
   }
-  const V mean = hn::Div(sum_of_squares, hn::Max(eq.count, one));
-  store(ScaleDown(hn::Sqrt(mean), scale), output.residual);
+  const V mean = hn::Div(residual.sum_of_squares, hn::Max(eq.count, one));
+  store(ScaleDown(hn::Mul(hn::Sqrt(mean), result_scale), scale), output.residual);
   const auto inside_bits = hn::RebindMask(di, inside);
   StoreBytes(
       hn::IfThenElseZero(inside_bits, hn::Min(hn::ConvertTo(di, eq.count), hn::Set(di, 255))),

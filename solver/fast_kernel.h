@@ -23,6 +23,8 @@ struct KernelLight {
 
 struct KernelParams {
   std::vector<KernelLight> lights;
+  // inverse_flux times this is what was asked: a power of two that keeps i' near 1.
+  float result_scale = 1.0F;
   float shadow_level = 0.0F;
   // Refuse where the bound on the condition number of L^T L is above this.
   float max_condition_squared = 0.0F;

@@ -1,6 +1,7 @@
 #include "solver/fast_rows.h"
 
 #include <algorithm>
+#include <cmath>
 #include <span>
 #include <vector>
 
@@ -12,13 +13,29 @@ namespace {
 
 constexpr int kPixelsPerPiece = 1 << 13;
 
-KernelLight KernelLightOf(const Light& light, const LightFrame& frame,
+// Irradiance that the light's green flux gives at the table's origin, or phi itself.
+double TypicalIrradiance(const Light& light) {
+  const double distance_m =
+      light.model == LightModel::kDistant ? 1.0 : light.position_mm.norm() / 1000.0;
+  return light.flux_rgb.y() / (distance_m * distance_m);
+}
+
+// The power of two next to the lights' geometric mean: fluxes come in any unit.
+double FluxScale(const Lights& lights) {
+  double sum = 0.0;
+  for (const Light& light : lights) {
+    sum += std::log2(TypicalIrradiance(light));
+  }
+  return std::exp2(std::round(sum / static_cast<double>(lights.size())));
+}
+
+KernelLight KernelLightOf(const Light& light, const LightFrame& frame, double flux_scale,
                           const LambertianOptions& options) {
   const bool distant = light.model == LightModel::kDistant;
   const Eigen::Vector3f place = (distant ? light.direction : light.position_mm).cast<float>();
   const Eigen::Vector3f axis = light.axis.cast<float>();
   const Eigen::Vector3f inverse_flux =
-      (light.flux_rgb * (distant ? 1.0 : 1e6)).cwiseInverse().cast<float>();
+      (light.flux_rgb * (distant ? 1.0 : 1e6) / flux_scale).cwiseInverse().cast<float>();
   return {.model = light.model,
           .place = {place.x(), place.y(), place.z()},
           .axis = {axis.x(), axis.y(), axis.z()},
@@ -54,33 +71,48 @@ Result<FastRows> FastRows::Make(const LightStack& stack, const Rig& rig,
   rows.params_.shadow_level = static_cast<float>(options.shadow_level);
   rows.params_.max_condition_squared = std::min(
       static_cast<float>(options.max_condition * options.max_condition), kFloatConditionSquared);
+  const double flux_scale = FluxScale(rig.lights);
+  rows.params_.result_scale = static_cast<float>(1.0 / flux_scale);
   for (size_t k = 0; k < stack.size(); ++k) {
-    rows.params_.lights.push_back(KernelLightOf(rig.lights[k], stack[k], options));
+    rows.params_.lights.push_back(KernelLightOf(rig.lights[k], stack[k], flux_scale, options));
   }
   return rows;
 }
 
-void FastRows::Run(SpanFunction function, int begin, int end, NormalField& field) const {
-  const auto width = static_cast<size_t>(field.reason.width);
+void FastRows::Solve(int begin, int end, NormalField& field) const {
+  std::vector<float> x_mm;
+  std::vector<float> y_mm;
+  if (grid_) {
+    const auto width = static_cast<size_t>(field.reason.width);
+    x_mm.resize(width * static_cast<size_t>(end - begin));
+    y_mm.resize(x_mm.size());
+    for (int row = begin; row < end; ++row) {
+      const size_t start = width * static_cast<size_t>(row - begin);
+      grid_->Row(row, std::span(x_mm).subspan(start, width), std::span(y_mm).subspan(start, width));
+    }
+  }
+  Run(SolveSpan, begin, end, x_mm, y_mm, field);
+}
+
+void FastRows::Touch(int begin, int end, NormalField& field) const {
+  Run(TouchSpan, begin, end, {}, {}, field);
+}
+
+void FastRows::Run(SpanFunction function, int begin, int end, std::span<const float> x_mm,
+                   std::span<const float> y_mm, NormalField& field) const {
   const size_t first = field.reason.Index(0, begin);
-  const size_t count = width * static_cast<size_t>(end - begin);
+  const size_t count = field.reason.Index(0, end) - first;
   std::vector<const float*> planes;
   for (const LightFrame& frame : *stack_) {
     for (const Image<float>& plane : frame.rgb.planes) {
       planes.push_back(plane.pixels.data() + first);
     }
   }
-  std::vector<float> x_mm(grid_ ? count : 0);
-  std::vector<float> y_mm(x_mm.size());
-  for (size_t start = 0; start < x_mm.size(); start += width) {
-    grid_->Row(begin + static_cast<int>(start / width), std::span(x_mm).subspan(start, width),
-               std::span(y_mm).subspan(start, width));
-  }
   const auto at = [&](auto& image) { return image.pixels.data() + first; };
   function(params_,
            {.planes = planes.data(),
-            .x_mm = grid_ ? x_mm.data() : nullptr,
-            .y_mm = grid_ ? y_mm.data() : nullptr,
+            .x_mm = x_mm.empty() ? nullptr : x_mm.data(),
+            .y_mm = y_mm.empty() ? nullptr : y_mm.data(),
             .mask = *mask_ ? at(**mask_) : nullptr,
             .count = count},
            {{at(field.normal[0]), at(field.normal[1]), at(field.normal[2])},

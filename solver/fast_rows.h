@@ -1,6 +1,7 @@
 #pragma once
 
 #include <optional>
+#include <span>
 
 #include "core/error.h"
 #include "core/task.h"
@@ -20,16 +21,17 @@ class FastRows {
                                              const LambertianOptions& options);
 
   // Solves rows [begin, end) into `field`; refused pixels are kIllConditioned.
-  void Solve(int begin, int end, NormalField& field) const { Run(SolveSpan, begin, end, field); }
-  // Moves the same bytes and computes nothing: the floor of Solve.
-  void Touch(int begin, int end, NormalField& field) const { Run(TouchSpan, begin, end, field); }
+  void Solve(int begin, int end, NormalField& field) const;
+  // Reads and writes the same bytes and only adds them up: the floor of Solve.
+  void Touch(int begin, int end, NormalField& field) const;
 
  private:
   using SpanFunction = void (*)(const KernelParams&, const KernelInput&, const KernelOutput&);
 
   FastRows(const LightStack& stack, const std::optional<Mask>& mask)
       : stack_(&stack), mask_(&mask) {}
-  void Run(SpanFunction function, int begin, int end, NormalField& field) const;
+  void Run(SpanFunction function, int begin, int end, std::span<const float> x_mm,
+           std::span<const float> y_mm, NormalField& field) const;
 
   const LightStack* stack_;
   const std::optional<Mask>* mask_;

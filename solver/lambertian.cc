@@ -135,15 +135,14 @@ int64_t CountPending(int row_begin, int row_end, const NormalField& field) {
 }
 
 Status SolveAllRows(const LightStack& stack, const Rig& rig, const std::optional<Mask>& mask,
-                    const LambertianOptions& options, const FastRows& fast_rows, const Task& task,
-                    NormalField& field) {
+                    const LambertianOptions& options, const std::optional<FastRows>& fast_rows,
+                    const Task& task, NormalField& field) {
   const ImageSize size = stack[0].rgb.Size();
-  const bool fast = options.backend == Backend::kFast || options.backend == Backend::kAuto;
   std::vector<int64_t> refused(static_cast<size_t>(size.height), 0);
   task.BeginStage("solving", size.height);
   Status status = ParallelFor(size.height, RowsPerPiece(size), task, [&](int begin, int end) {
-    if (fast) {
-      fast_rows.Solve(begin, end, field);
+    if (fast_rows) {
+      fast_rows->Solve(begin, end, field);
       refused[static_cast<size_t>(begin)] = CountPending(begin, end, field);
     } else {
       ClearRows(mask, begin, end, field);
@@ -151,8 +150,8 @@ Status SolveAllRows(const LightStack& stack, const Rig& rig, const std::optional
     if (options.backend == Backend::kFast || CountPending(begin, end, field) == 0) {
       return;
     }
-    SolveRowsInDouble(stack, rig, options, fast ? Backend::kJacobiSvd : options.backend, kPending,
-                      begin, end, field);
+    SolveRowsInDouble(stack, rig, options, fast_rows ? Backend::kJacobiSvd : options.backend,
+                      kPending, begin, end, field);
   });
   field.summary.resolved_by_reference =
       options.backend == Backend::kAuto
@@ -219,19 +218,25 @@ Status SolveLambertianInto(const LightStack& stack, const Rig& rig, const std::o
       !status) {
     return status;
   }
-  const Result<FastRows> fast_rows = FastRows::Make(stack, rig, mask, options);
-  if (!fast_rows) {
-    return tl::unexpected(fast_rows.error());
+  std::optional<FastRows> fast_rows;
+  if (options.backend == Backend::kFast || options.backend == Backend::kAuto) {
+    Result<FastRows> made = FastRows::Make(stack, rig, mask, options);
+    if (!made) {
+      return tl::unexpected(made.error());
+    }
+    fast_rows = std::move(*made);
   }
   field.Resize(stack[0].rgb.Size());
   field.summary = {};
-  if (Status status = SolveAllRows(stack, rig, mask, options, *fast_rows, task, field); !status) {
+  if (Status status = SolveAllRows(stack, rig, mask, options, fast_rows, task, field); !status) {
     return status;
   }
   CountReasons(field.reason, field.summary);
   field.summary.threads = task.ThreadCount();
   field.summary.backend = options.backend;
-  field.summary.instruction_set = KernelInstructionSet();
+  if (fast_rows) {
+    field.summary.instruction_set = KernelInstructionSet();
+  }
   field.summary.seconds =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return {};

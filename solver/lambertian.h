@@ -47,7 +47,8 @@ struct LambertianOptions {
   // where nothing saturates. In [0, 1).
   double dark_level = 1e-4;
   // A pixel is ill-conditioned where the usable lights' condition number (largest over smallest
-  // singular value of the l_k) is above this. In [2, 1e6].
+  // singular value of the l_k) is above this. kFast goes by an upper bound, up to three times too
+  // large, and refuses above about 14 in any case. In [2, 1e6].
   double max_condition = 1000.0;
 
   // Names the first field out of range, with its value and its range.
@@ -65,7 +66,7 @@ struct SolveSummary {
   double seconds = 0.0;
   int threads = 0;
   Backend backend = Backend::kAuto;
-  std::string_view instruction_set;  // kFast, kAuto: what the loop was compiled for
+  std::string_view instruction_set;  // kFast, kAuto: what the loop was compiled for; else empty
 };
 
 struct NormalField {

@@ -80,11 +80,11 @@ void PixelSystem::Gather(int column, int row) {
 }
 
 Reason PixelSystem::SampleReason() const {
-  if (count_ >= 3) {
-    return Reason::kSolved;
-  }
   if (!bright_) {
     return Reason::kDark;
+  }
+  if (count_ >= 3) {
+    return Reason::kSolved;
   }
   return saturated_ > 0 ? Reason::kSaturated : Reason::kTooFewSamples;
 }

@@ -17,7 +17,7 @@ struct Solution {
   double condition = std::numeric_limits<double>::infinity();
 };
 
-// As seed and textbook have it: dynamic size, double, decomposed anew for each pixel.
+// As the source and textbooks have it: dynamic size, double, decomposed anew for each pixel.
 struct JacobiSvd {
   static Solution Solve(const PixelSystem& system) {
     const Eigen::JacobiSVD<Eigen::MatrixXd> svd(system.L(),

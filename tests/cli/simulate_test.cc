@@ -61,6 +61,23 @@ TEST(SimulateCommand, NamesTheKeyThatIsWrong) {
               HasSubstr("fog"));
 }
 
+TEST(SimulateCommand, ALightThatNoFileCanBeNamedAfterIsRefused) {
+  const TempFolder folder;
+  const std::string scene = (folder.Path() / "scene.json").string();
+  std::ifstream sample(fs::path(SATEEN_SOURCE_DIR) / "samples" / "rigs" / "ring10.json");
+  nlohmann::json rig = nlohmann::json::parse(sample);
+  rig["lights"][3]["name"] = "../x";
+  WriteText(folder.Path() / "rig.json", rig.dump());
+  WriteText(scene, R"({"schema": "sateen.scene/1", "rig": "rig.json",
+                       "surface": {"shape": "flat"}, "albedo": {"min": 0.1, "max": 1}})");
+
+  const RunResult run = Simulate({scene, "-o", (folder.Path() / "out").string()});
+
+  EXPECT_EQ(run.exit_status, 3);
+  EXPECT_THAT(run.log, HasSubstr("\"../x\""));
+  EXPECT_FALSE(fs::exists(folder.Path() / "out"));
+}
+
 TEST(SimulateCommand, AMissingRigIsNamed) {
   const TempFolder folder;
   const std::string scene = (folder.Path() / "scene.json").string();

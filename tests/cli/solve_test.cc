@@ -5,6 +5,7 @@
 #include <sys/resource.h>
 
 #include <csignal>
+#include <fstream>
 
 #include "imaging/image_io.h"
 #include "tests/cli/cli_runner.h"
@@ -174,6 +175,37 @@ TEST_F(SolveCommand, AnOutputThatIsAFileIsAnIoError) {
 
   EXPECT_EQ(run.exit_status, 4);
   EXPECT_THAT(run.log, HasSubstr("taken"));
+}
+
+TEST_F(SolveCommand, TheCaptureItselfIsNoPlaceForMaps) {
+  const RunResult run = Solve({Path("session"), "-o", Path("session")});
+
+  EXPECT_EQ(run.exit_status, 2);
+  EXPECT_THAT(run.log, HasSubstr("is the capture itself"));
+  EXPECT_FALSE(fs::exists(Path("session/normal.exr")));
+}
+
+TEST_F(SolveCommand, ATiltedSheetIsRefused) {
+  std::ifstream file(Path("session/session.json"));
+  nlohmann::json session = nlohmann::json::parse(file);
+  session["table_from_sheet"] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 5, 0, 0, 0, 1};
+  WriteText(Path("session/session.json"), session.dump());
+
+  const RunResult run = Solve({Path("session"), "-o", Path("maps")});
+
+  EXPECT_EQ(run.exit_status, 3);
+  EXPECT_THAT(run.log, HasSubstr("table_from_sheet"));
+}
+
+TEST_F(SolveCommand, TheErrorMapOfAnEarlierSolveDoesNotStay) {
+  ASSERT_EQ(Solve({Path("session"), "-o", Path("maps")}).exit_status, 0);
+  ASSERT_TRUE(fs::exists(Path("maps/error.exr")));
+  fs::remove_all(Path("session/truth"));
+
+  ASSERT_EQ(Solve({Path("session"), "-o", Path("maps")}).exit_status, 0);
+
+  EXPECT_FALSE(fs::exists(Path("maps/error.exr")));
+  EXPECT_TRUE(fs::exists(Path("maps/normal.exr")));
 }
 
 TEST_F(SolveCommand, CancellingLeavesNothing) {

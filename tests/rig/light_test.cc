@@ -110,7 +110,7 @@ TEST(Light, ValidateNamesTheFieldOutOfRange) {
                       }),
               HasSubstr("axis [0, 0, 0] has length 0; need a unit vector"));
   EXPECT_THAT(message(LightModel::kLed, [](Light& l) { l.anisotropy = -1; }),
-              HasSubstr("anisotropy -1; need 0 to 100"));
+              HasSubstr("anisotropy -1; need 0 to 50"));
   EXPECT_THAT(message(LightModel::kDistant, [](Light& l) { l.flux_rgb.y() = 0; }),
               HasSubstr("intensity [1, 0, 3]; need three finite numbers > 0"));
 }

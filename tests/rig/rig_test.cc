@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <nlohmann/json.hpp>
 #include <numbers>
 
@@ -105,6 +106,13 @@ TEST(RigToJson, RoundTripsToTheLastBit) {
   Json file = FullRig();
   const double third = 1.0 / 3.0;
   file["lights"][0]["direction"] = {0.5774, 0.5773, 0.5774};  // normalised on reading
+  for (int k = 0; k < 100; ++k) {  // enough for some whose length is not 1 to the last bit
+    Json light = file["lights"][0];
+    light["name"] = fmt::format("d{}", k);
+    light["direction"] = {std::round(6e3 * std::cos(k)) / 1e4, std::round(6e3 * std::sin(k)) / 1e4,
+                          0.8};
+    file["lights"].push_back(light);
+  }
   file["lights"][2]["axis"] = {0, -0.6001, -0.8};
   file["lights"][1]["flux_rgb"] = {third, std::numbers::pi, 1e-300};
   file["camera"]["table_from_camera"][5] = -0.8000001;  // made orthonormal on reading
@@ -202,7 +210,7 @@ TEST(ReadRig, ValuesOutOfRangeAreNamed) {
   EXPECT_THAT(MessageWith("/lights", Json::array()), HasSubstr("lights is empty"));
   EXPECT_THAT(MessageWith("/lights/1/channel", -1), HasSubstr("lights[1]: channel is -1"));
   EXPECT_THAT(MessageWith("/lights/1/name", "a"), HasSubstr("the name \"a\" is taken"));
-  EXPECT_THAT(MessageWith("/lights/1/name", ""), HasSubstr("lights[1].name is empty"));
+  EXPECT_THAT(MessageWith("/lights/1/name", ""), HasSubstr("lights[1].name is \"\"; need a name"));
   EXPECT_THAT(MessageWith("/calibration", 3), HasSubstr("calibration is 3; need an object"));
 }
 

@@ -36,7 +36,7 @@ TEST(AngularErrorDeg, GivesMeanMedianPercentileAndMaximum) {
   const ErrorStatistics error = AngularErrorDeg(field, UpwardTruth(5)).value();
 
   // Float normals carry angles of degrees to about 4e-6 degrees.
-  EXPECT_EQ(error.pixels, 5);
+  EXPECT_EQ(error.count, 5);
   EXPECT_NEAR(error.mean, 3.2, 1e-5);
   EXPECT_NEAR(error.median, 2.0, 1e-5);
   EXPECT_NEAR(error.p99, 3.0 + 0.96 * 7.0, 1e-5);  // 0.99 of the way through four intervals
@@ -65,7 +65,7 @@ TEST(AngularErrorDeg, LeavesOutUnsolvedPixelsAndUnknownTruth) {
 
   const ErrorStatistics error = AngularErrorDeg(field, truth, &map).value();
 
-  EXPECT_EQ(error.pixels, 1);
+  EXPECT_EQ(error.count, 1);
   EXPECT_NEAR(error.max, 5.0, 1e-5);
   EXPECT_NEAR(map.pixels[0], 5.0F, 1e-5F);
   EXPECT_EQ(map.pixels[1], 0.0F);
@@ -90,7 +90,7 @@ TEST(RelativeAlbedoError, IsRelativeToTheTruthOfEachChannel) {
 
   const ErrorStatistics error = RelativeAlbedoError(field, truth).value();
 
-  EXPECT_EQ(error.pixels, 2);
+  EXPECT_EQ(error.count, 2);
   EXPECT_NEAR(error.max, 0.10, 1e-6);
   EXPECT_NEAR(error.mean, 0.075, 1e-6);
 }

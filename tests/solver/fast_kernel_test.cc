@@ -68,8 +68,8 @@ class Generator {
                         .model = model,
                         .direction = up,
                         .position_mm = Real(200.0, 900.0) * up,
-                        .axis = -up,
-                        .anisotropy = Int(0, 1) == 0 ? 1.0 : Real(0.0, 4.0),
+                        .axis = -(up + Eigen::Vector3d(Real(-1, 1), Real(-1, 1), 0)).normalized(),
+                        .anisotropy = std::max(0.0, Real(-1.0, 4.0)),
                         .flux_rgb = {Real(0.1, 1.0), Real(0.1, 1.0), Real(0.1, 1.0)}});
     }
     return lights;
@@ -103,6 +103,16 @@ int CaseCount() {
   return from_environment != nullptr ? std::atoi(from_environment) : 400;
 }
 
+void ExpectSameResidual(const NormalField& fast, const NormalField& reference) {
+  for (size_t p = 0; p < fast.reason.pixels.size(); ++p) {
+    if (ReasonAt(fast, p) == Reason::kSolved) {
+      // Rounding is relative to the samples, some of which are larger than what is solved for.
+      const float scale = reference.albedo[1].pixels[p] + reference.residual.pixels[p];
+      ASSERT_NEAR(fast.residual.pixels[p], reference.residual.pixels[p], 1e-4F * scale);
+    }
+  }
+}
+
 TEST(FastKernel, AgreesWithTheReferenceOnRandomStacks) {
   int64_t compared = 0;
   for (int seed = 0; seed < CaseCount(); ++seed) {
@@ -133,7 +143,8 @@ TEST(FastKernel, AgreesWithTheReferenceOnRandomStacks) {
     EXPECT_LT(angle.max, 1e-3);  // the bar; refused pixels are not in it
     // Rounding is relative to the samples, and spoiled ones are far larger than the albedo.
     EXPECT_LT(RelativeAlbedoError(*fast, reference->albedo).value().p99, 1e-4);
-    compared += angle.pixels;
+    ExpectSameResidual(*fast, *reference);
+    compared += angle.count;
   }
   EXPECT_GT(compared, 100 * CaseCount());  // that the cases are not all refused
 }

@@ -153,6 +153,83 @@ TEST_P(EveryBackend, AnEarlierResultInTheSameMemoryLeavesNoTrace) {
   EXPECT_EQ(field.summary.dark, 33 * 17);
 }
 
+TEST_P(EveryBackend, PixelsBelowTheDarkLevelAreDarkHoweverManySamplesTheyHave) {
+  const Rig rig = RingRig({33, 17});
+  RenderedRelief relief = Render(rig, {33, 17});
+  for (LightFrame& frame : relief.stack) {
+    frame.full_scale = 100.0F;  // the brightest sample is below 1
+  }
+  LambertianOptions options = Options();
+  options.dark_level = 0.01;
+
+  const NormalField field = SolveLambertian(relief.stack, rig, std::nullopt, options).value();
+
+  EXPECT_EQ(field.summary.dark, 33 * 17);
+  EXPECT_EQ(field.normal[2].pixels[0], 0.0F);
+  EXPECT_EQ(field.albedo[1].pixels[0], 0.0F);
+}
+
+TEST_P(EveryBackend, AnLedLightsNothingBehindIt) {
+  Rig rig = RingRig({33, 17}, LightModel::kLed);
+  for (Light& light : rig.lights) {
+    light.anisotropy = 0.0;  // even where it shines evenly before it
+  }
+  RenderedRelief relief = Render(rig, {33, 17}, 10.0);
+  rig.lights[2].axis = -rig.lights[2].axis;  // said to be turned round: its samples are no use
+
+  const NormalField field = SolveLambertian(relief.stack, rig, std::nullopt, Options()).value();
+
+  EXPECT_EQ(field.samples.pixels[100], 9);
+  EXPECT_LT(AngularErrorDeg(field, relief.normal).value().max, 1e-3);
+}
+
+TEST_P(EveryBackend, FluxInAnyUnitMeetsRadianceInAnyUnit) {
+  for (const double flux : {1e-30, 1e-9, 1e6, 1e9, 1e34}) {
+    SCOPED_TRACE(flux);
+    Rig rig = RingRig({33, 17});
+    RenderedRelief relief = Render(rig, {33, 17});
+    for (Light& light : rig.lights) {
+      light.flux_rgb *= flux;
+    }
+    const float radiance = flux > 1.0 ? 1e-11F : 1e11F;  // the other way
+    ScaleRadiance(relief.stack, radiance);
+
+    const NormalField field = SolveLambertian(relief.stack, rig, std::nullopt, Options()).value();
+
+    EXPECT_EQ(field.summary.solved, 33 * 17);
+    EXPECT_EQ(field.summary.resolved_by_reference, 0);
+    EXPECT_LT(AngularErrorDeg(field, relief.normal).value().max, 1e-3);
+    const double expected =
+        static_cast<double>(relief.albedo[1].pixels[7]) / flux * static_cast<double>(radiance);
+    if (expected > 1e-37 && expected < 1e37) {  // what a float can say
+      EXPECT_NEAR(static_cast<double>(field.albedo[1].pixels[7]) / expected, 1.0, 1e-5);
+    }
+  }
+}
+
+// Cancels as soon as the solve reports a first step.
+class CancelAtFirstStep : public Progress {
+ public:
+  void BeginStage(std::string_view /*name*/, int /*total*/) override {}
+  void Clear() override {}
+  void Advance(int /*steps*/) override { cancel = true; }
+
+  std::atomic<bool> cancel = false;
+};
+
+TEST_P(EveryBackend, StopsInTheMiddleWhenCancelled) {
+  const Rig rig = RingRig({64, 512});
+  const RenderedRelief relief = Render(rig, {64, 512});
+  CancelAtFirstStep progress;
+
+  const Result<NormalField> field =
+      SolveLambertian(relief.stack, rig, std::nullopt, Options(),
+                      {.progress = &progress, .cancel = &progress.cancel});
+
+  ASSERT_FALSE(field);
+  EXPECT_EQ(field.error().code, ErrorCode::kCancelled);
+}
+
 TEST_P(EveryBackend, StopsWhenCancelled) {
   const Rig rig = RingRig({33, 17});
   const RenderedRelief relief = Render(rig, {33, 17});
