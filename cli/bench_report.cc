@@ -74,9 +74,11 @@ std::string Marks(const BenchReport& report, const LogAxis& x, const LogAxis& y)
     const std::string color = ColorOf(row.case_name);
     svg +=
         fmt::format("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"5\" fill=\"{}\"/>\n", px, py, color);
-    // fast and auto lie close together: one label above its mark, the other below.
-    const double dy = row.backend == Backend::kAuto ? 18.0 : -9.0;
-    svg += Text(px, py + dy, "middle", Name(row.backend), color);
+    // Slanted, as backends lie close together: auto below its mark, the others above.
+    const bool below = row.backend == Backend::kAuto;
+    svg += fmt::format(
+        "<text transform=\"translate({:.1f} {:.1f}) rotate({})\" fill=\"{}\">{}</text>\n", px + 5.0,
+        below ? py + 12.0 : py - 6.0, below ? 40 : -40, color, Name(row.backend));
   }
   return svg;
 }
@@ -143,9 +145,9 @@ std::string SvgPlot(const BenchReport& report) {
   const LogAxis y{-7, 1, 400.0, 40.0};
   const BenchFloor& floor = report.floors.back();
   std::string svg =
-      "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"700\" height=\"460\" "
+      "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"780\" height=\"460\" "
       "font-family=\"sans-serif\" font-size=\"12\">\n"
-      "<rect width=\"700\" height=\"460\" fill=\"#ffffff\"/>\n";
+      "<rect width=\"780\" height=\"460\" fill=\"#ffffff\"/>\n";
   svg += Text(365.0, 22.0, "middle",
               fmt::format("{} near lights, {} threads, {}: lower left is better", report.lights,
                           floor.threads, report.instruction_set));
@@ -155,8 +157,10 @@ std::string SvgPlot(const BenchReport& report) {
   svg += Text(x.At(floor.ns_per_pixel) + 4.0, y.end + 12.0, "start", "memory bandwidth");
   svg += Marks(report, x, y);
   for (size_t i = 0; i < kCases.size(); ++i) {
-    svg +=
-        Text(650.0, 60.0 + 16.0 * static_cast<double>(i), "end", kCases[i].name, kCases[i].color);
+    const double at = 60.0 + 20.0 * static_cast<double>(i);
+    svg += fmt::format("<circle cx=\"690\" cy=\"{:.1f}\" r=\"5\" fill=\"{}\"/>\n", at - 4.0,
+                       kCases[i].color);
+    svg += Text(702.0, at, "start", kCases[i].name, kCases[i].color);
   }
   svg += Text(365.0, 440.0, "middle", "time [ns/pixel]");
   svg +=

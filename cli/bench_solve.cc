@@ -100,6 +100,8 @@ class Bench {
       return tl::unexpected(cases.error());
     }
     report_.lights = static_cast<int>(cases->front().rig.lights.size());
+    task_.BeginStage("measuring",
+                     static_cast<int>(thread_counts_.size() * cases->size() * kBackends.size()));
     for (const int threads : thread_counts_) {
       Status status = MeasureFloor(cases->front(), threads);
       for (const BenchCase& bench_case : *cases) {
@@ -163,6 +165,7 @@ class Bench {
     row.angular_error_deg = *AngularErrorDeg(field_, bench_case.rendered.normal);
     row.albedo_error = RelativeAlbedoError(field_, bench_case.rendered.albedo)->mean;
     report_.rows.push_back(row);
+    task_.Advance();
     return task_.CheckCancelled();
   }
 

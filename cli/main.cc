@@ -1,4 +1,5 @@
 #include <CLI/CLI.hpp>
+#include <csignal>
 #include <exception>
 #include <iostream>
 #include <new>
@@ -36,6 +37,7 @@ int Run(int argc, char** argv) {
     return app.exit(error) == 0 ? 0 : kUsage;
   }
   sateen::InstallInterruptHandlers();
+  std::signal(SIGXFSZ, SIG_IGN);  // a file that may not grow is an error of writing, not an end
   sateen::ProgressBar progress(2);
   const sateen::Task task{.progress = &progress, .cancel = &sateen::InterruptFlag()};
   int status = 0;

@@ -128,7 +128,7 @@ Result<SceneFile> Simulate(const SimulateArgs& args, const Task& task) {
     status = folder->Commit();
   }
   if (!status) {
-    return tl::unexpected(status.error());
+    return tl::unexpected(folder->InPlace(status.error()));
   }
   return file;
 }

@@ -135,7 +135,7 @@ Result<SolveOutcome> SolveCapture(const SolveArgs& args, const Task& task, std::
     status = folder->Commit();
   }
   if (!status) {
-    return tl::unexpected(status.error());
+    return tl::unexpected(folder->InPlace(status.error()));
   }
   return outcome;
 }
@@ -148,7 +148,7 @@ void AddSolve(CLI::App& root, SolveArgs& args) {
   cmd->add_option(
          "capture", args.capture,
          "A session folder (session.json), a DiLiGenT folder, an RTI .lp file, or a folder "
-         "of images with a lights.txt in it or beside it")
+         "of images with a lights.txt in it or one folder up")
       ->required();
   cmd->add_option("-o,--output", args.output, "Folder for the maps; made where missing")
       ->required();
@@ -156,7 +156,8 @@ void AddSolve(CLI::App& root, SolveArgs& args) {
   cmd->add_option("--mask", args.mask_file,
                   "Image that is white where to solve, instead of the capture's own mask");
   cmd->add_option("--lights", args.read.lights, "Use only these lights, by index: 0,10,20")
-      ->delimiter(',');
+      ->delimiter(',')
+      ->allow_extra_args(false);  // or it would take the capture for a light
   cmd->add_option("--backend", args.backend,
                   "How the least squares are solved; auto is fast, and the reference (jacobi-svd) "
                   "where fast is not exact enough")

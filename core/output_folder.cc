@@ -184,6 +184,15 @@ Status OutputFolder::WriteText(const std::string& name, const std::string& text)
 
 void OutputFolder::Retire(const std::string& name) { retired_.push_back(name); }
 
+Error OutputFolder::InPlace(Error error) const {
+  const std::string staged = staging_dir_.string();
+  for (size_t at = error.message.find(staged); !staged.empty() && at != std::string::npos;
+       at = error.message.find(staged)) {
+    error.message.replace(at, staged.size(), dir_.string());
+  }
+  return error;
+}
+
 Status OutputFolder::Commit() {
   SATEEN_CHECK(!staging_dir_.empty());
   for (const std::string& name : names_) {

@@ -33,6 +33,8 @@ class OutputFolder {
   [[nodiscard]] Status WriteText(const std::string& name, const std::string& text);
   // Commit() takes away the file `name` of an earlier run, unless it is staged.
   void Retire(const std::string& name);
+  // The error of whoever wrote to a staged place, speaking of the place that the user knows.
+  [[nodiscard]] Error InPlace(Error error) const;
   // kIo names the file that could not be flushed or put in place.
   [[nodiscard]] Status Commit();
 

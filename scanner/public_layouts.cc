@@ -48,7 +48,8 @@ Status CheckDiligentTables(const DiligentTables& tables, const fs::path& dir) {
   });
 }
 
-// The photographs of a folder; what looks like one but is not read is left out with a warning.
+// The photographs of a folder. Cameras write RAW and JPEG side by side: RAW files count where there
+// is nothing else, and are otherwise left out with a warning.
 std::vector<std::string> SelectImages(const std::vector<std::string>& names, CapturePlan& plan) {
   std::vector<std::string> images;
   std::vector<std::string> raws;
@@ -60,10 +61,13 @@ std::vector<std::string> SelectImages(const std::vector<std::string>& names, Cap
       raws.push_back(name);
     }
   }
+  if (images.empty()) {
+    return raws;
+  }
   if (!raws.empty()) {
     plan.warnings.push_back(
-        fmt::format("{} camera RAW files were left out, the first is {}; only "
-                    "a session can hold them",
+        fmt::format("{} camera RAW files were left out, the first is {}: the folder also has other "
+                    "images; move those away to use the RAW files",
                     raws.size(), raws.front()));
   }
   return images;

@@ -99,11 +99,10 @@ Status CheckInputs(const LightStack& stack, const Rig& rig, const std::optional<
 constexpr Reason kPending = Reason::kIllConditioned;
 
 void CountReasons(const Image<uint8_t>& reason, SolveSummary& summary) {
-  std::array<int64_t, 256> histogram = {};
-  for (const uint8_t code : reason.pixels) {
-    ++histogram[code];
-  }
-  const auto count = [&](Reason which) { return histogram[static_cast<uint8_t>(which)]; };
+  // One vectorised pass a reason; a histogram would wait for its own last increment at every pixel.
+  const auto count = [&](Reason which) -> int64_t {
+    return std::count(reason.pixels.begin(), reason.pixels.end(), static_cast<uint8_t>(which));
+  };
   summary.solved = count(Reason::kSolved);
   summary.dark = count(Reason::kDark);
   summary.too_few_samples = count(Reason::kTooFewSamples);

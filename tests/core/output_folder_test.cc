@@ -129,6 +129,32 @@ TEST_F(OutputFolderTest, CommitReplacesItsOwnFilesOnly) {
   EXPECT_EQ(Text(dir_ / "notes.txt"), "mine");
 }
 
+TEST_F(OutputFolderTest, CommitTakesAwayWhatIsRetired) {
+  testing::WriteText(dir_ / "error.exr", "old");
+  testing::WriteText(dir_ / "notes.txt", "mine");
+  OutputFolder folder = OutputFolder::Open(dir_).value();
+  ASSERT_TRUE(folder.WriteText("normal.exr", "new"));
+  folder.Retire("error.exr");
+  folder.Retire("never-was.exr");
+  EXPECT_TRUE(fs::exists(dir_ / "error.exr"));  // not before
+
+  ASSERT_TRUE(folder.Commit());
+
+  EXPECT_FALSE(fs::exists(dir_ / "error.exr"));
+  EXPECT_TRUE(fs::exists(dir_ / "normal.exr"));
+  EXPECT_TRUE(fs::exists(dir_ / "notes.txt"));
+}
+
+TEST_F(OutputFolderTest, ErrorsSpeakOfThePlaceThatTheUserKnows) {
+  OutputFolder folder = OutputFolder::Open(dir_).value();
+  const std::string staged = folder.Stage("normal.exr").string();
+
+  const Error error = folder.InPlace({ErrorCode::kIo, staged + ": full, " + staged});
+
+  EXPECT_EQ(error.message,
+            (dir_ / "normal.exr").string() + ": full, " + (dir_ / "normal.exr").string());
+}
+
 TEST_F(OutputFolderTest, FailedCommitNamesTheFileAndPutsOldFilesBack) {
   testing::WriteText(dir_ / "a.exr", "old a");
   testing::WriteText(dir_ / "b/notes.txt", "mine");
