@@ -231,7 +231,7 @@ Result<RawMosaic> ReadRawMosaic(const std::filesystem::path& path) {
   }
 }
 
-Image3 Demosaic(const RawMosaic& mosaic) {
+Image3 Demosaic(const RawMosaic& mosaic, const std::array<float, 3>& white_balance) {
   const int width = mosaic.samples.width;
   const int height = mosaic.samples.height;
   SATEEN_CHECK(width >= 2 && height >= 2);
@@ -258,6 +258,11 @@ Image3 Demosaic(const RawMosaic& mosaic) {
         rgb[kGreen].pixels[p] = near.Cross();
         rgb[static_cast<size_t>(kBlue - own)].pixels[p] = near.Corners();
       }
+    }
+  }
+  for (size_t c = 0; c < 3; ++c) {
+    for (float& value : rgb[c].pixels) {
+      value *= white_balance[c];
     }
   }
   return rgb;

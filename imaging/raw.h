@@ -39,6 +39,9 @@ struct RawMosaic {
 // Camera RGB at every pixel. Bilinear: the mean of the nearest sites of each colour; measured
 // values are kept as they are at their own sites. At the border the mosaic continues as its mirror
 // image about the outermost row or column, which keeps the colours in their places.
-[[nodiscard]] Image3 Demosaic(const RawMosaic& mosaic);
+// Channels are multiplied by `white_balance`, which is 1 unless asked: pass the chart's, or
+// mosaic.camera_white_balance.
+[[nodiscard]] Image3 Demosaic(const RawMosaic& mosaic,
+                              const std::array<float, 3>& white_balance = {1.0F, 1.0F, 1.0F});
 
 }  // namespace sateen

@@ -332,18 +332,6 @@ HWY_INLINE VI ReasonOf(const Gathered& gathered, M enough, M accepted) {
   return hn::IfThenElse(bits(gathered.bright), bright, code(Reason::kDark));
 }
 
-// A vector wholly outside the mask.
-HWY_INLINE void StoreUnsolved(size_t offset, const KernelOutput& output) {
-  const D d;
-  for (size_t c = 0; c < 3; ++c) {
-    hn::StoreU(hn::Zero(d), d, output.normal[c] + offset);
-    hn::StoreU(hn::Zero(d), d, output.albedo[c] + offset);
-  }
-  hn::StoreU(hn::Zero(d), d, output.residual + offset);
-  StoreBytes(hn::Zero(DI()), output.samples + offset);
-  StoreBytes(hn::Set(DI(), static_cast<int32_t>(Reason::kOutsideMask)), output.reason + offset);
-}
-
 template <bool kDistant>
 HWY_INLINE void SolveVector(const KernelParams& params, const KernelInput& input, size_t offset,
                             const KernelOutput& output, State& state) {

@@ -1,5 +1,5 @@
-// From spans of any length to whole vectors, for solver/fast_kernel.cc, and the span that only moves
-// the bytes. Compiled once for each instruction set, hence the guard that toggles.
+// From spans of any length to whole vectors, for solver/fast_kernel.cc, and the vectors that need no
+// solve. Compiled once for each instruction set, hence the guard that toggles.
 #if defined(SATEEN_SOLVER_FAST_KERNEL_SPANS_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef SATEEN_SOLVER_FAST_KERNEL_SPANS_INL_H_
 #undef SATEEN_SOLVER_FAST_KERNEL_SPANS_INL_H_
@@ -12,9 +12,22 @@
 
 #include "solver/fast_kernel.h"
 #include "solver/fast_kernel_vectors-inl.h"
+#include "solver/lambertian.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace sateen::HWY_NAMESPACE {
+// A vector wholly outside the mask.
+HWY_INLINE void StoreUnsolved(size_t offset, const KernelOutput& output) {
+  const D d;
+  for (size_t c = 0; c < 3; ++c) {
+    hn::StoreU(hn::Zero(d), d, output.normal[c] + offset);
+    hn::StoreU(hn::Zero(d), d, output.albedo[c] + offset);
+  }
+  hn::StoreU(hn::Zero(d), d, output.residual + offset);
+  StoreBytes(hn::Zero(DI()), output.samples + offset);
+  StoreBytes(hn::Set(DI(), static_cast<int32_t>(Reason::kOutsideMask)), output.reason + offset);
+}
+
 HWY_INLINE void TouchVector(const KernelParams& params, const KernelInput& input, size_t offset,
                             const KernelOutput& output) {
   const D d;

@@ -29,6 +29,16 @@ RawMosaic Mosaic(ImageSize size, const std::array<uint8_t, 4>& cfa, Rgb rgb) {
   return mosaic;
 }
 
+TEST(Demosaic, WhiteBalanceMultipliesTheChannelsOnlyWhenAsked) {
+  const RawMosaic grey = Mosaic({4, 4}, kBayerOrders[0], [](int, int, int) { return 0.25F; });
+
+  EXPECT_EQ(Demosaic(grey)[0].At(1, 1), 0.25F);
+  const Image3 balanced = Demosaic(grey, {2.0F, 1.0F, 1.5F});
+  EXPECT_EQ(balanced[0].At(1, 1), 0.5F);
+  EXPECT_EQ(balanced[1].At(1, 1), 0.25F);
+  EXPECT_EQ(balanced[2].At(1, 1), 0.375F);
+}
+
 TEST(Demosaic, IsExactOnLinearRampsAwayFromTheBorder) {
   // Multiples of 1/256: every sum and half of them is exact in float.
   const auto ramp = [](int x, int y, int c) {
