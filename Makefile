@@ -47,14 +47,14 @@ asan: setup  ## All tests under the address and undefined-behaviour sanitizers
 	@cmake --build --preset asan -j$(JOBS)
 	@UBSAN_OPTIONS=print_stacktrace=1 $(CTEST) --test-dir build/asan
 
-# Where threads are: the others would only take time.
-TSAN_TESTS = sateen_core_parallel_test sateen_core_progress_bar_test sateen_solver_lambertian_test \
-             sateen_scanner_stack_reader_test
-tsan: setup  ## The tests of what runs on several threads, under the thread sanitizer
+# By hand and not in CI: the system's oneTBB and OpenImageIO are not instrumented, and some runs
+# report how they hand work from thread to thread. Look for our own files in what it prints.
+TSAN_TESTS = sateen_core_parallel_test sateen_solver_lambertian_test sateen_scanner_stack_reader_test
+tsan: setup  ## The tests of what runs on several threads, under the thread sanitizer (not in CI)
 	@cmake --preset tsan --log-level=WARNING
 	@cmake --build --preset tsan -j$(JOBS) --target $(TSAN_TESTS)
 	@TSAN_OPTIONS="suppressions=$(CURDIR)/tests/tsan.supp" $(CTEST) --test-dir build/tsan \
-	    -R '^(core/parallel|core/progress_bar|solver/lambertian|scanner/stack_reader)_test$$'
+	    -R '^(core/parallel|solver/lambertian|scanner/stack_reader)_test$$'
 
 clean:  ## Remove build/
 	@rm -rf build
