@@ -18,7 +18,7 @@ help:  ## This list
 setup:  ## Install the Debian packages that are missing (packages.txt)
 	@tools/setup
 
-demo: build  ## The whole loop on a simulated rig
+demo: build  ## Render a small light stack, solve it, compare with the truth
 	@samples/demo.sh
 
 build: setup  ## Build everything into build/release
