@@ -2,14 +2,13 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <sys/resource.h>
 
-#include <csignal>
 #include <fstream>
 
 #include "imaging/image_io.h"
 #include "tests/cli/cli_runner.h"
 #include "tests/testing/files.h"
+#include "tests/testing/full_disk.h"
 
 namespace sateen {
 namespace {
@@ -217,26 +216,6 @@ TEST_F(SolveCommand, CancellingLeavesNothing) {
   EXPECT_FALSE(fs::exists(Path("maps")));
 }
 
-// A disk that is full after `bytes`: writes beyond fail as they do on a full file system.
-class FullDisk {
- public:
-  explicit FullDisk(rlim_t bytes) : handler_(std::signal(SIGXFSZ, SIG_IGN)) {
-    getrlimit(RLIMIT_FSIZE, &before_);
-    const rlimit limited{bytes, before_.rlim_max};
-    setrlimit(RLIMIT_FSIZE, &limited);
-  }
-  FullDisk(const FullDisk&) = delete;
-  FullDisk& operator=(const FullDisk&) = delete;
-  ~FullDisk() {
-    setrlimit(RLIMIT_FSIZE, &before_);
-    std::signal(SIGXFSZ, handler_);
-  }
-
- private:
-  rlimit before_ = {};
-  void (*handler_)(int);
-};
-
 TEST_F(SolveCommand, AFullDiskLeavesTheFormerMapsWhole) {
   ASSERT_EQ(Solve({Path("session"), "-o", Path("maps")}).exit_status, 0);
   const Image3 before = ReadImage3(Path("maps/normal.exr")).value();
@@ -244,7 +223,7 @@ TEST_F(SolveCommand, AFullDiskLeavesTheFormerMapsWhole) {
 
   RunResult run;
   {
-    const FullDisk full(4000);
+    const testing::FullDisk full(4000);
     run = Solve({Path("session"), "-o", Path("maps"), "--normal-y", "down"});
   }
 

@@ -2,18 +2,17 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <sys/resource.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
-#include <csignal>
 #include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "tests/testing/files.h"
+#include "tests/testing/full_disk.h"
 
 namespace sateen {
 namespace {
@@ -48,26 +47,6 @@ class AsNobody {
 
  private:
   uid_t was_;
-};
-
-// As on a full disk, no file can grow beyond `bytes`.
-class FullDisk {
- public:
-  explicit FullDisk(rlim_t bytes) : old_handler_(std::signal(SIGXFSZ, SIG_IGN)) {
-    EXPECT_EQ(getrlimit(RLIMIT_FSIZE, &old_), 0);
-    const rlimit limit = {.rlim_cur = bytes, .rlim_max = old_.rlim_max};
-    EXPECT_EQ(setrlimit(RLIMIT_FSIZE, &limit), 0);
-  }
-  FullDisk(const FullDisk&) = delete;
-  FullDisk& operator=(const FullDisk&) = delete;
-  ~FullDisk() {
-    EXPECT_EQ(setrlimit(RLIMIT_FSIZE, &old_), 0);
-    std::signal(SIGXFSZ, old_handler_);
-  }
-
- private:
-  void (*old_handler_)(int);
-  rlimit old_ = {};
 };
 
 class OutputFolderTest : public ::testing::Test {
@@ -260,7 +239,7 @@ TEST_F(OutputFolderTest, FoldersWithoutWritePermissionAreRefused) {
 TEST_F(OutputFolderTest, FullDiskFailsTheWriteAndKeepsOldFiles) {
   testing::WriteText(dir_ / "solve.json", "old");
   {
-    const FullDisk full(100);
+    const testing::FullDisk full(100);
     OutputFolder folder = OutputFolder::Open(dir_).value();
     const Status written = folder.WriteText("solve.json", std::string(1000, 'x'));
     ASSERT_FALSE(written);
@@ -300,7 +279,7 @@ TEST_F(WriteFileWholeTest, FullDiskKeepsTheOldFile) {
   const fs::path path = temp_.Path() / "rig.json";
   testing::WriteText(path, "old");
   {
-    const FullDisk full(100);
+    const testing::FullDisk full(100);
     const Status written = WriteFileWhole(path, std::string(1000, 'x'));
     ASSERT_FALSE(written);
     EXPECT_EQ(written.error().code, ErrorCode::kIo);

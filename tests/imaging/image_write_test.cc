@@ -1,15 +1,14 @@
 #include <OpenImageIO/imageio.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <sys/resource.h>
 
-#include <csignal>
 #include <limits>
 #include <string>
 
 #include "imaging/image_io.h"
 #include "tests/imaging/pictures.h"
 #include "tests/testing/files.h"
+#include "tests/testing/full_disk.h"
 
 namespace sateen {
 namespace {
@@ -95,27 +94,6 @@ TEST(Writers, FailWithTheNameWhereTheFolderIsAbsent) {
   EXPECT_THAT(status.error().message, HasSubstr("No such file or directory"));
 }
 
-// Lets files grow to `bytes` only while it lives, as a full disk would.
-class FileSizeLimit {
- public:
-  explicit FileSizeLimit(rlim_t bytes) {
-    getrlimit(RLIMIT_FSIZE, &before_);
-    signal_before_ = std::signal(SIGXFSZ, SIG_IGN);
-    const rlimit limit{bytes, before_.rlim_max};
-    setrlimit(RLIMIT_FSIZE, &limit);
-  }
-  FileSizeLimit(const FileSizeLimit&) = delete;
-  FileSizeLimit& operator=(const FileSizeLimit&) = delete;
-  ~FileSizeLimit() {
-    setrlimit(RLIMIT_FSIZE, &before_);
-    std::signal(SIGXFSZ, signal_before_);
-  }
-
- private:
-  rlimit before_ = {};
-  void (*signal_before_)(int) = nullptr;
-};
-
 TEST(Writers, NoticeThatTheDiskIsFullAtAnyByte) {
   const TempFolder folder;
   const std::filesystem::path exr = folder.Path() / "a.exr";
@@ -128,11 +106,11 @@ TEST(Writers, NoticeThatTheDiskIsFullAtAnyByte) {
   const std::uintmax_t png_bytes = std::filesystem::file_size(png);
   for (const std::uintmax_t missing : {1U, 2U, 20U, 70U}) {
     const Status exr_status = [&] {
-      const FileSizeLimit limit(exr_bytes - missing);
+      const testing::FullDisk limit(exr_bytes - missing);
       return WriteExr(exr, TestImage());
     }();
     const Status png_status = [&] {
-      const FileSizeLimit limit(png_bytes - missing);
+      const testing::FullDisk limit(png_bytes - missing);
       return WritePng16(png, planes);
     }();
     ASSERT_FALSE(exr_status) << missing;
