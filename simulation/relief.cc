@@ -6,29 +6,12 @@
 #include <numbers>
 
 #include "core/parallel.h"
+#include "simulation/random.h"
 
 namespace sateen {
 namespace {
 
 constexpr double kTwoPi = 2.0 * std::numbers::pi;
-
-// SplitMix64 (Steele, Lea, Flood 2014): a good hash of a counter, so that noise depends on the
-// sample and the seed alone and not on the order in which samples are rendered.
-uint64_t Mix(uint64_t x) {
-  x += 0x9e3779b97f4a7c15U;
-  x = (x ^ (x >> 30U)) * 0xbf58476d1ce4e5b9U;
-  x = (x ^ (x >> 27U)) * 0x94d049bb133111ebU;
-  return x ^ (x >> 31U);
-}
-
-double UniformOf(uint64_t bits) {  // in (0, 1]
-  return (static_cast<double>(bits >> 11U) + 1.0) * 0x1p-53;
-}
-
-double NormalDeviate(uint64_t seed, uint64_t sample) {  // Box and Muller
-  const uint64_t first = Mix(Mix(seed) ^ sample);
-  return std::sqrt(-2.0 * std::log(UniformOf(first))) * std::cos(kTwoPi * UniformOf(Mix(first)));
-}
 
 // What the sensor reports for `radiance`, as radiance again.
 double Sensed(const SensorModel& sensor, double radiance, uint64_t seed, uint64_t sample) {

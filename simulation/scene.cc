@@ -1,0 +1,200 @@
+#include "simulation/scene.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "core/check.h"
+
+namespace sateen {
+namespace {
+
+constexpr double kPatchGround = 0.18;
+
+[[nodiscard]] tl::unexpected<Error> BadValue(std::string_view key, double value,
+                                             std::string_view range) {
+  return Fail(ErrorCode::kInvalidArgument, "{} = {:g}; need {}", key, value, range);
+}
+
+bool IsFraction(double value) { return value >= 0.0 && value <= 1.0; }
+
+Eigen::Vector3d Evaluated(const ConstantAlbedo& albedo, double /*x*/, double /*y*/) {
+  return albedo.rgb;
+}
+
+Eigen::Vector3d Evaluated(const WavyAlbedo& albedo, double x, double y) {
+  const double k = 2.0 * std::numbers::pi / albedo.period_mm;
+  const Eigen::Array3d phase(k * (x + y), k * (x - y) + 2.0, k * y + 4.0);
+  return albedo.min + (albedo.max - albedo.min) * (0.5 + 0.5 * phase.sin());
+}
+
+Eigen::Vector3d Evaluated(const ChessboardAlbedo& albedo, double x, double y) {
+  const double column = std::floor(x / albedo.square_mm + 0.5 * albedo.columns);
+  const double row = std::floor(y / albedo.square_mm + 0.5 * albedo.rows);
+  const bool inside = column >= 0.0 && column < albedo.columns && row >= 0.0 && row < albedo.rows;
+  const bool dark = inside && std::fmod(column + row, 2.0) == 0.0;
+  return Eigen::Vector3d::Constant(dark ? albedo.dark : albedo.light);
+}
+
+Eigen::Vector3d Evaluated(const PatchesAlbedo& albedo, double x, double y) {
+  const auto count = static_cast<double>(albedo.values.size());
+  const double patch = std::floor(x / albedo.patch_mm + 0.5 * count);
+  const bool inside = patch >= 0.0 && patch < count && std::abs(y) < 0.5 * albedo.patch_mm;
+  return Eigen::Vector3d::Constant(inside ? albedo.values[static_cast<size_t>(patch)]
+                                          : kPatchGround);
+}
+
+Status CheckAlbedo(const ConstantAlbedo& albedo) {
+  for (const double value : albedo.rgb) {
+    if (!IsFraction(value)) {
+      return BadValue("albedo", value, "0 to 1");
+    }
+  }
+  return {};
+}
+
+Status CheckAlbedo(const WavyAlbedo& albedo) {
+  if (!(albedo.min >= 0.0 && albedo.min <= albedo.max)) {
+    return BadValue("albedo.min", albedo.min, "0 <= min <= max");
+  }
+  if (!(albedo.max <= 1.0)) {
+    return BadValue("albedo.max", albedo.max, "max <= 1");
+  }
+  return albedo.period_mm > 0.0 ? Status()
+                                : BadValue("albedo.period_mm", albedo.period_mm, "more than 0");
+}
+
+Status CheckAlbedo(const ChessboardAlbedo& albedo) {
+  if (std::min(albedo.columns, albedo.rows) < 2) {
+    return BadValue("albedo.columns, rows", std::min(albedo.columns, albedo.rows), "2 or more");
+  }
+  if (!(albedo.square_mm > 0.0)) {
+    return BadValue("albedo.square_mm", albedo.square_mm, "more than 0");
+  }
+  if (!IsFraction(albedo.dark)) {
+    return BadValue("albedo.dark", albedo.dark, "0 to 1");
+  }
+  return IsFraction(albedo.light) ? Status() : BadValue("albedo.light", albedo.light, "0 to 1");
+}
+
+Status CheckAlbedo(const PatchesAlbedo& albedo) {
+  if (!(albedo.patch_mm > 0.0)) {
+    return BadValue("albedo.patch_mm", albedo.patch_mm, "more than 0");
+  }
+  for (const double value : albedo.values) {
+    if (!IsFraction(value)) {
+      return BadValue("albedo.patches", value, "0 to 1 each");
+    }
+  }
+  return {};
+}
+
+Status CheckIllumination(const Illumination& illumination) {
+  if (illumination.shadow_samples < 1 || illumination.shadow_samples > 16) {
+    return BadValue("illumination.shadow_samples", illumination.shadow_samples, "1 to 16");
+  }
+  if (illumination.bounce_rays < 0 || illumination.bounce_rays > 65536) {
+    return BadValue("illumination.bounce_rays", illumination.bounce_rays, "0 to 65536");
+  }
+  for (const double value : illumination.ambient_rgb) {
+    if (!(value >= 0.0 && std::isfinite(value))) {
+      return BadValue("illumination.ambient_rgb", value, "0 or more each");
+    }
+  }
+  if (!(illumination.flicker >= 0.0 && illumination.flicker <= 0.2)) {
+    return BadValue("illumination.flicker", illumination.flicker, "0 to 0.2");
+  }
+  return {};
+}
+
+Status CheckLens(const Lens& lens) {
+  for (int i = 0; i <= 100; ++i) {
+    const double r2 = i / 100.0;
+    const auto [v1, v2, v3] = lens.vignetting;
+    const double gain = 1.0 + r2 * (v1 + r2 * (v2 + r2 * v3));
+    if (!(gain > 0.0 && gain <= 4.0)) {
+      return BadValue("lens.vignetting", gain,
+                      "a gain of more than 0 and at most 4 from the centre to the corner");
+    }
+  }
+  if (!(lens.psf_sigma_px >= 0.0 && lens.psf_sigma_px <= 20.0)) {
+    return BadValue("lens.psf_sigma_px", lens.psf_sigma_px, "0 to 20");
+  }
+  if (lens.samples < 1 || lens.samples > 16) {
+    return BadValue("lens.samples", lens.samples, "1 to 16");
+  }
+  if (!(lens.bump_px.cwiseAbs().maxCoeff() <= 1000.0)) {
+    return BadValue("lens.bump.shift_px", lens.bump_px.cwiseAbs().maxCoeff(), "-1000 to 1000");
+  }
+  return {};
+}
+
+Status CheckAbove(const Surface& surface, std::string_view what, const Eigen::Vector3d& at_mm) {
+  const double height_mm = surface.At(at_mm.x(), at_mm.y()).height_mm;
+  const double highest_mm = std::isfinite(surface.HighestMm()) ? surface.HighestMm() : height_mm;
+  if (!(at_mm.z() > std::max(height_mm, highest_mm))) {
+    return Fail(ErrorCode::kInvalidArgument,
+                "{} is at z = {:g} mm, inside or below the sample; need more than {:g} mm", what,
+                at_mm.z(), std::max(height_mm, highest_mm));
+  }
+  return {};
+}
+
+Status CheckPlaces(const Rig& rig, const Surface& surface) {
+  Status status = CheckAbove(surface, "the camera", rig.camera->table_from_camera.translation());
+  for (const Light& light : rig.lights) {
+    if (status && light.model != LightModel::kDistant) {
+      status = CheckAbove(surface, "light '" + light.name + "'", light.position_mm);
+    }
+  }
+  return status;
+}
+
+Status CheckLightNames(const Scene& scene) {
+  std::vector<std::string> asked = scene.illumination.dead;
+  if (!scene.lens.bump_from.empty()) {
+    asked.push_back(scene.lens.bump_from);
+  }
+  for (const std::string& name : asked) {
+    if (std::ranges::find(scene.rig.lights, name, &Light::name) == scene.rig.lights.end()) {
+      std::vector<std::string> names;
+      for (const Light& light : scene.rig.lights) {
+        names.push_back(light.name);
+      }
+      return Fail(ErrorCode::kInvalidArgument, "light '{}' is not in the rig; need one of {}", name,
+                  fmt::join(names, ", "));
+    }
+  }
+  return {};
+}
+
+}  // namespace
+
+Eigen::Vector3d AlbedoAt(const Albedo& albedo, double x_mm, double y_mm) {
+  return std::visit([&](const auto& kind) { return Evaluated(kind, x_mm, y_mm); }, albedo);
+}
+
+Status Scene::Validate() const {
+  SATEEN_CHECK(surface != nullptr && materials.size() == surface->Parts().size());
+  if (Status status = rig.Validate("rig"); !status) {
+    return status;
+  }
+  if (!rig.camera) {
+    return Fail(ErrorCode::kInvalidArgument, "the rig has no camera; need one, for the frames");
+  }
+  for (const Material& material : materials) {
+    Status status = std::visit([](const auto& kind) { return CheckAlbedo(kind); }, material.albedo);
+    if (status && !(material.yarn_variation >= 0.0 && material.yarn_variation < 1.0)) {
+      status = BadValue("yarn_variation", material.yarn_variation, "0 to below 1");
+    }
+    if (!status) {
+      return status;
+    }
+  }
+  return CheckIllumination(illumination)
+      .and_then([&] { return CheckLens(lens); })
+      .and_then([&] { return CheckPlaces(rig, *surface); })
+      .and_then([&] { return CheckLightNames(*this); });
+}
+
+}  // namespace sateen

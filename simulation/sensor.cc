@@ -1,0 +1,98 @@
+#include "simulation/sensor.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/parallel.h"
+#include "simulation/random.h"
+
+namespace sateen {
+namespace {
+
+constexpr int kSensorRows = 16;
+
+}  // namespace
+
+Status Sensor::Validate() const {
+  const auto fail = [](std::string_view field, double value, std::string_view range) {
+    return Fail(ErrorCode::kInvalidArgument, "{} = {:g}; need {}", field, value, range);
+  };
+  if (bits != 12 && bits != 14 && bits != 16) {
+    return fail("bits", bits, "12, 14 or 16");
+  }
+  const double top = std::exp2(bits) - 1.0;
+  if (!(white_dn > 0.0 && white_dn <= top && white_dn == std::floor(white_dn))) {
+    return fail("white", white_dn, fmt::format("a whole number from 1 to {:g}", top));
+  }
+  if (!(black_dn >= 0.0 && black_dn < white_dn && black_dn == std::floor(black_dn))) {
+    return fail("black", black_dn, fmt::format("a whole number from 0 to below {:g}", white_dn));
+  }
+  if (!(full_scale > 0.0 && std::isfinite(full_scale))) {
+    return fail("full_scale", full_scale, "more than 0");
+  }
+  if (full_well_electrons && !(*full_well_electrons > 0.0 && std::isfinite(*full_well_electrons))) {
+    return fail("full_well_electrons", *full_well_electrons, "more than 0");
+  }
+  if (!(read_noise_electrons >= 0.0 && std::isfinite(read_noise_electrons))) {
+    return fail("read_noise_electrons", read_noise_electrons, "0 or more");
+  }
+  return {};
+}
+
+std::optional<Sensor> SensorNamed(std::string_view name) {
+  if (name == "nikon-d5100") {
+    return Sensor{.bits = 14,
+                  .black_dn = 0.0,
+                  .white_dn = 15892.0,
+                  .full_well_electrons = 42000.0,
+                  .read_noise_electrons = 3.0};
+  }
+  return std::nullopt;
+}
+
+std::optional<std::array<uint8_t, 4>> BayerNamed(std::string_view name) {
+  constexpr std::string_view kColours = "RGB";
+  for (const std::string_view known : {"RGGB", "GRBG", "GBRG", "BGGR"}) {
+    if (name == known) {
+      std::array<uint8_t, 4> cfa = {};
+      std::ranges::transform(known, cfa.begin(), [&](char colour) {
+        return static_cast<uint8_t>(kColours.find(colour));
+      });
+      return cfa;
+    }
+  }
+  return std::nullopt;
+}
+
+Result<Image<uint16_t>> Expose(const Sensor& sensor, const Image3& radiance, uint64_t seed,
+                               const Task& task) {
+  if (Status status = sensor.Validate(); !status) {
+    return tl::unexpected(status.error());
+  }
+  const ImageSize size = radiance.Size();
+  const double range_dn = sensor.white_dn - sensor.black_dn;
+  const double full_well = sensor.full_well_electrons.value_or(1.0);
+  const double read_variance = sensor.read_noise_electrons * sensor.read_noise_electrons;
+  Image<uint16_t> mosaic(size);
+  const Status status = ParallelFor(size.height, kSensorRows, task, [&](int begin, int end) {
+    for (int y = begin; y < end; ++y) {
+      for (int x = 0; x < size.width; ++x) {
+        const uint8_t colour = sensor.cfa[static_cast<size_t>(y % 2 * 2 + x % 2)];
+        const size_t site = mosaic.Index(x, y);
+        const auto i = static_cast<double>(radiance[colour].pixels[site]);
+        double e = full_well * i / sensor.full_scale;  // (1)
+        if (sensor.full_well_electrons) {
+          e += std::sqrt(std::max(e, 0.0) + read_variance) * NormalDeviate(seed, site);  // (2)
+        }
+        const double dn = std::round(sensor.black_dn + range_dn * e / full_well);  // (3)
+        mosaic.pixels[site] = static_cast<uint16_t>(std::clamp(dn, 0.0, sensor.white_dn));
+      }
+    }
+  });
+  if (!status) {
+    return tl::unexpected(status.error());
+  }
+  return mosaic;
+}
+
+}  // namespace sateen
