@@ -11,6 +11,8 @@ namespace sateen::cli {
 struct SimulateArgs {
   std::filesystem::path scene;
   std::filesystem::path output;
+  bool linear = false;
+  bool list = false;
   int threads = 0;
 };
 

@@ -63,12 +63,35 @@ Status Evaluate(SolveOutcome& outcome, std::optional<Image<float>>& error_map_de
   return {};
 }
 
+// CLI11's own ranges let "nan" pass.
+std::string FaultOfAngle(const std::string& text) {
+  double angle_deg = 0.0;
+  const bool is_angle =
+      CLI::detail::lexical_cast(text, angle_deg) && angle_deg > 0.0 && angle_deg <= 180.0;
+  return is_angle ? "" : fmt::format("{} is not an angle in (0, 180] degrees", text);
+}
+
+std::string WhyNotPassed(const SolveArgs& args, const SolveOutcome& outcome) {
+  if (!outcome.angular_error_deg) {
+    return fmt::format("no solved pixel has truth to compare with for --fail-above {}",
+                       *args.fail_above_deg);
+  }
+  return fmt::format("mean angular error {:.4g} deg is above --fail-above {}",
+                     outcome.angular_error_deg->mean, *args.fail_above_deg);
+}
+
 // What the formats can say and this solver does not do, or must not.
 Status CheckSupported(const SolveArgs& args, Capture& capture) {
   if (capture.session && capture.session->table_from_sheet) {
     return Fail(ErrorCode::kBadData,
                 "{}: the session has table_from_sheet, but solving a tilted sheet is not supported "
                 "yet; remove the key if the sheet lay on the table",
+                args.capture.string());
+  }
+  if (args.fail_above_deg && !capture.truth) {
+    return Fail(ErrorCode::kBadData,
+                "{}: the capture has no truth; --fail-above needs truth/normal.exr, normal_gt.exr "
+                "or Normal_gt.mat",
                 args.capture.string());
   }
   std::error_code ignored;  // a folder that does not exist yet is no other folder
@@ -142,6 +165,12 @@ Result<SolveOutcome> SolveCapture(const SolveArgs& args, const Task& task, std::
 
 }  // namespace
 
+bool Passed(const SolveArgs& args, const SolveOutcome& outcome) {
+  // Not "above", so that NaN does not pass.
+  return !args.fail_above_deg || (outcome.angular_error_deg.has_value() &&
+                                  outcome.angular_error_deg->mean <= *args.fail_above_deg);
+}
+
 void AddSolve(CLI::App& root, SolveArgs& args) {
   CLI::App* cmd =
       root.add_subcommand("solve", "Solve surface normal and albedo for every pixel of a capture");
@@ -190,6 +219,10 @@ void AddSolve(CLI::App& root, SolveArgs& args) {
   cmd->add_option("--threads", args.threads, "Threads to use; 0: one for each core")
       ->check(CLI::Range(0, 1024))
       ->capture_default_str();
+  cmd->add_option("--fail-above", args.fail_above_deg,
+                  "Exit with status 3 when the mean angular error from truth is above this, in "
+                  "degrees (0, 180]; the maps are written all the same")
+      ->check(CLI::Validator(FaultOfAngle, "DEG"));
   cmd->add_flag("--json", args.json, "Print the report as one JSON object on stdout");
 }
 
@@ -201,6 +234,10 @@ int RunSolve(const SolveArgs& args, const Task& task, std::ostream& out, std::os
     return ExitStatus(outcome.error());
   }
   out << (args.json ? JsonReport(args, *outcome) : TextReport(args, *outcome)) << '\n';
+  if (!Passed(args, *outcome)) {
+    log << "sateen solve: " << WhyNotPassed(args, *outcome) << '\n';
+    return ExitStatus({ErrorCode::kBadData, ""});
+  }
   return 0;
 }
 

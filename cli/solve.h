@@ -26,6 +26,8 @@ struct SolveArgs {
   std::string normal_y = "up";
   LambertianOptions solver;
   int threads = 0;
+  // Largest mean angular error from truth that passes, in (0, 180]; the capture must have truth.
+  std::optional<double> fail_above_deg;
   bool json = false;
 };
 
@@ -38,6 +40,9 @@ struct SolveOutcome {
   double seconds_reading = 0.0;
   double seconds_total = 0.0;
 };
+
+// Whether the mean angular error is within args.fail_above_deg; true where that is not given.
+[[nodiscard]] bool Passed(const SolveArgs& args, const SolveOutcome& outcome);
 
 void AddSolve(CLI::App& root, SolveArgs& args);
 // Returns the program's exit status. Results go to `out`, warnings and errors to `log`.

@@ -83,6 +83,10 @@ std::string JsonReport(const SolveArgs& args, const SolveOutcome& outcome) {
   if (outcome.albedo_error) {
     report["albedo_error"] = ToJson(*outcome.albedo_error);
   }
+  if (args.fail_above_deg) {
+    report["fail_above_deg"] = *args.fail_above_deg;
+    report["passed"] = Passed(args, outcome);
+  }
   // A path that is not UTF-8 must not end the run.
   return report.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }

@@ -3,8 +3,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <fstream>
 
+#include "imaging/raw.h"
+#include "scanner/session.h"
 #include "tests/cli/cli_runner.h"
 #include "tests/testing/files.h"
 
@@ -16,6 +19,7 @@ using sateen::testing::Simulate;
 using sateen::testing::TempFolder;
 using sateen::testing::WriteText;
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 namespace fs = std::filesystem;
 
@@ -23,42 +27,132 @@ std::string SampleScene(const std::string& name) {
   return (fs::path(SATEEN_SOURCE_DIR) / "samples" / "scenes" / name).string();
 }
 
-TEST(SimulateCommand, EverySampleSceneRenders) {
-  const TempFolder folder;
-  int scenes = 0;
-  for (const auto& entry : fs::directory_iterator(fs::path(SATEEN_SOURCE_DIR) / "samples/scenes")) {
-    const fs::path out = folder.Path() / entry.path().stem();
-    const RunResult run = Simulate({entry.path().string(), "-o", out.string()});
-    EXPECT_EQ(run.exit_status, 0) << run.log;
-    EXPECT_TRUE(fs::exists(out / "session.json")) << entry.path();
-    EXPECT_TRUE(fs::exists(out / "truth" / "normal.exr")) << entry.path();
-    ++scenes;
-  }
-  EXPECT_GE(scenes, 2);
+TEST(SimulateCommand, ListsEverySampleSceneWithItsTitle) {
+  const RunResult run = Simulate({"--list", SampleScene("")});
+  EXPECT_EQ(run.exit_status, 0) << run.log;
+  EXPECT_THAT(run.out, HasSubstr("Denim twill under ten LEDs (fabric, 10 lights, 640x480 px)"));
+  EXPECT_THAT(run.out, HasSubstr("White paper, flat (sheet"));
+  EXPECT_THAT(run.out, Not(HasSubstr("cannot be read")));
+  EXPECT_GE(std::count(run.out.begin(), run.out.end(), '\n'), 2 * 20);
+  EXPECT_EQ(Simulate({"--list", SampleScene("gone")}).exit_status, 4);
 }
 
-TEST(SimulateCommand, NamesTheKeyThatIsWrong) {
-  const TempFolder folder;
-  const auto log_of = [&](const std::string& scene) {
-    const std::string path = (folder.Path() / "scene.json").string();
-    WriteText(path, scene);
-    const RunResult run = Simulate({path, "-o", (folder.Path() / "out").string()});
-    EXPECT_EQ(run.exit_status, 3) << scene;
-    EXPECT_FALSE(fs::exists(folder.Path() / "out"));
+// A scene of 160x120 pixels under one ring of ten lights.
+class SmallScene {
+ public:
+  explicit SmallScene(const std::string& rest) {
+    std::ifstream sample(fs::path(SATEEN_SOURCE_DIR) / "samples" / "rigs" / "ring10.json");
+    nlohmann::json rig = nlohmann::json::parse(sample);
+    rig["camera"]["size_px"] = {160, 120};
+    rig["camera"]["k"] = {488.0, 488.0, 79.5, 59.5};
+    WriteText(folder_.Path() / "rig.json", rig.dump());
+    WriteText(folder_.Path() / "scene.json",
+              R"({"schema": "sateen.scene/1", "rig": "rig.json", )" + rest + "}");
+  }
+  [[nodiscard]] RunResult Run(std::vector<std::string> options = {}) const {
+    options.insert(options.begin(), {(folder_.Path() / "scene.json").string(), "-o", Out()});
+    return Simulate(options);
+  }
+  [[nodiscard]] std::string Out() const { return (folder_.Path() / "out").string(); }
+
+ private:
+  TempFolder folder_;
+};
+
+constexpr const char* kFlat = R"("surface": {"shape": "plane"},
+  "materials": {"surface": {"texture": {"kind": "waves", "min": 0.2, "max": 0.8,
+                                        "period_mm": 400}}})";
+
+TEST(SimulateCommand, WritesTheSessionOfARealScanner) {
+  const SmallScene scene(std::string(kFlat) + R"(, "sensor": {"preset": "nikon-d5100"})");
+  const RunResult run = scene.Run();
+  ASSERT_EQ(run.exit_status, 0) << run.log;
+  const fs::path out = scene.Out();
+  const Result<Session> session = ReadSession(out);
+  ASSERT_TRUE(session) << session.error().message;
+  ASSERT_EQ(session->frames.size(), 11U);
+  EXPECT_EQ(session->frames[3].file, "frames/led-3.dng");
+  EXPECT_EQ(session->frames[10].role, FrameRole::kDark);
+  EXPECT_EQ(session->frames[0].exposure_s, 0.02);
+  for (const char* name : {"normal.exr", "albedo.exr", "height.exr", "rig.json", "lit/led-9.png"}) {
+    EXPECT_TRUE(fs::exists(out / "truth" / name)) << name;
+  }
+  const Result<RawMosaic> mosaic = ReadRawMosaic(out / "frames/led-0.dng");
+  ASSERT_TRUE(mosaic) << mosaic.error().message;
+  EXPECT_EQ(mosaic->white, 15892.0F);
+  EXPECT_NEAR(*mosaic->exposure_s, 0.02, 1e-6);
+  EXPECT_NEAR(*mosaic->f_number, 8.0, 1e-6);
+}
+
+// Noise-free 16-bit RAW without shadows: what rounding and demosaicing of a smooth surface leave.
+TEST(SimulateCommand, NoiseFreeRawSolvesToTheTruth) {
+  const SmallScene scene(kFlat);
+  ASSERT_EQ(scene.Run().exit_status, 0);
+  const RunResult solved =
+      sateen::testing::Solve({scene.Out(), "-o", scene.Out() + "/maps", "--json"});
+  ASSERT_EQ(solved.exit_status, 0) << solved.log;
+  EXPECT_LT(solved.Json()["angular_error_deg"]["mean"].get<double>(), 0.01);
+  EXPECT_LT(solved.Json()["albedo_error"]["mean"].get<double>(), 0.01);
+}
+
+TEST(SimulateCommand, LinearFramesSolveToTheTruthExactly) {
+  const SmallScene scene(kFlat);
+  ASSERT_EQ(scene.Run({"--linear"}).exit_status, 0);
+  EXPECT_TRUE(fs::exists(fs::path(scene.Out()) / "frames/led-0.exr"));
+  const RunResult solved =
+      sateen::testing::Solve({scene.Out(), "-o", scene.Out() + "/maps", "--json"});
+  ASSERT_EQ(solved.exit_status, 0) << solved.log;
+  EXPECT_LT(solved.Json()["angular_error_deg"]["max"].get<double>(), 1e-4);
+  EXPECT_LT(solved.Json()["albedo_error"]["max"].get<double>(), 1e-5);
+  // RAW frames of a second run take the place of the first run's.
+  ASSERT_EQ(scene.Run().exit_status, 0);
+  EXPECT_FALSE(fs::exists(fs::path(scene.Out()) / "frames/led-0.exr"));
+}
+
+TEST(SimulateCommand, ErrorsNameTheKeyAndItsRange) {
+  const auto log_of = [](const std::string& rest) {
+    const SmallScene scene(rest);
+    const RunResult run = scene.Run();
+    EXPECT_EQ(run.exit_status, 3) << rest;
+    EXPECT_FALSE(fs::exists(scene.Out()));
     return run.log;
   };
-  const std::string head = R"({"schema": "sateen.scene/1", "rig": "rig.json", )";
+  const auto flat_with = [&](const std::string& more) {
+    return log_of(std::string(kFlat) + ", " + more);
+  };
+  const auto surface = [&](const std::string& text) {
+    return log_of(R"("surface": )" + text + R"(, "materials": {"surface": {"albedo": [1, 1, 1]}})");
+  };
+  EXPECT_THAT(surface(R"({"shape": "cube"})"), HasSubstr("surface.shape 'cube'; need plane"));
+  EXPECT_THAT(surface(R"({"shape": "sphere", "radius_mm": -1, "edge_deg": 40})"),
+              HasSubstr("surface.radius_mm = -1; need radius_mm > 0"));
+  EXPECT_THAT(surface(R"({"shape": "waves", "period_mm": 5, "max_slope_deg": 90})"),
+              HasSubstr("surface.max_slope_deg 90; need 0 to below 90 degrees"));
+  EXPECT_THAT(log_of(R"("surface": {"shape": "plane"},
+                        "materials": {"surface": {"albedo": [0.5, -0.5, 0.5]}})"),
+              HasSubstr("albedo = -0.5; need 0 to 1"));
+  EXPECT_THAT(log_of(R"("surface": {"shape": "plane"}, "materials": {"surface": {"albedo":
+                        [1, 1, 1], "specular": {"model": "ggx", "f0": 0.04, "alpha": -1}}})"),
+              HasSubstr("alpha = -1"));
+  EXPECT_THAT(log_of(R"("surface": {"shape": "plane"}, "materials": {"yarn": {}})"),
+              HasSubstr("materials.surface"));
+  EXPECT_THAT(flat_with(R"("fog": 1)"), HasSubstr("fog"));
+  EXPECT_THAT(flat_with(R"("sensor": {"bits": 13})"), HasSubstr("sensor.bits = 13; need 12, 14"));
+  EXPECT_THAT(flat_with(R"("sensor": {"bayer": "RGBG"})"), HasSubstr("sensor.bayer 'RGBG'"));
+  EXPECT_THAT(flat_with(R"("illumination": {"shadows": "soft"})"),
+              HasSubstr("illumination.shadows 'soft'; need none, attached or cast"));
+  EXPECT_THAT(flat_with(R"("illumination": {"dead": "led-77"})"), HasSubstr("'led-77'"));
+  EXPECT_THAT(flat_with(R"("lens": {"bump": {"from": "led-1"}})"), HasSubstr("shift_px"));
+  EXPECT_THAT(flat_with(R"("exposure": {"exposure_s": 0, "f_number": 8, "iso": 100})"),
+              HasSubstr("exposure.exposure_s 0; need more than 0"));
+}
 
-  EXPECT_THAT(log_of(head + R"("surface": {"shape": "cube"}, "albedo": {"min": 0.1, "max": 1}})"),
-              HasSubstr("surface.shape 'cube'; need flat, dome or ripple"));
-  EXPECT_THAT(log_of(head + R"("surface": {"shape": "dome", "max_slope_deg": 90},
-                               "albedo": {"min": 0.1, "max": 1}})"),
-              HasSubstr("surface.max_slope_deg"));
-  EXPECT_THAT(log_of(head + R"("surface": {"shape": "flat"}, "albedo": {"min": -0.1, "max": 1}})"),
-              HasSubstr("albedo.min"));
-  EXPECT_THAT(log_of(head + R"("surface": {"shape": "flat"}, "albedo": {"min": 0.1, "max": 1},
-                               "fog": 1})"),
-              HasSubstr("fog"));
+TEST(SimulateCommand, AMissingHeightMapIsNamed) {
+  const SmallScene scene(R"("surface": {"shape": "height-map", "file": "gone.exr", "pitch_mm": 1},
+                            "materials": {"surface": {"albedo": [1, 1, 1]}})");
+  const RunResult run = scene.Run();
+  EXPECT_EQ(run.exit_status, 4);
+  EXPECT_THAT(run.log, HasSubstr("gone.exr"));
 }
 
 TEST(SimulateCommand, ALightThatNoFileCanBeNamedAfterIsRefused) {
@@ -69,7 +163,8 @@ TEST(SimulateCommand, ALightThatNoFileCanBeNamedAfterIsRefused) {
   rig["lights"][3]["name"] = "../x";
   WriteText(folder.Path() / "rig.json", rig.dump());
   WriteText(scene, R"({"schema": "sateen.scene/1", "rig": "rig.json",
-                       "surface": {"shape": "flat"}, "albedo": {"min": 0.1, "max": 1}})");
+                       "surface": {"shape": "plane"},
+                       "materials": {"surface": {"albedo": [0.5, 0.5, 0.5]}}})");
 
   const RunResult run = Simulate({scene, "-o", (folder.Path() / "out").string()});
 
@@ -82,7 +177,8 @@ TEST(SimulateCommand, AMissingRigIsNamed) {
   const TempFolder folder;
   const std::string scene = (folder.Path() / "scene.json").string();
   WriteText(scene, R"({"schema": "sateen.scene/1", "rig": "gone.json",
-                       "surface": {"shape": "flat"}, "albedo": {"min": 0.1, "max": 1}})");
+                       "surface": {"shape": "plane"},
+                       "materials": {"surface": {"albedo": [0.5, 0.5, 0.5]}}})");
 
   const RunResult run = Simulate({scene, "-o", (folder.Path() / "out").string()});
 
@@ -94,7 +190,8 @@ TEST(SimulateCommand, TheSameSceneGivesTheSameBytes) {
   const TempFolder folder;
   for (const char* threads : {"1", "2"}) {
     const std::string out = (folder.Path() / threads).string();
-    ASSERT_EQ(Simulate({SampleScene("dome.json"), "-o", out, "--threads", threads}).exit_status, 0);
+    ASSERT_EQ(Simulate({SampleScene("ripple.json"), "-o", out, "--threads", threads}).exit_status,
+              0);
   }
   const auto bytes = [&](const char* threads) {
     std::ifstream file(folder.Path() / threads / "session.json");

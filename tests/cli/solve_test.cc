@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <fstream>
 
 #include "imaging/image_io.h"
@@ -31,14 +32,15 @@ constexpr const char* kRig = R"({
              "distortion": [0, 0, 0, 0, 0],
              "table_from_camera": [1, 0, 0, 0, 0, -1, 0, 0, 0, 0, -1, 610, 0, 0, 0, 1]},
   "lights": [
-    {"name": "east", "channel": 0, "model": "near", "position_mm": [400, 0, 450], "flux_rgb": [0.4, 0.4, 0.4]},
-    {"name": "north", "channel": 1, "model": "near", "position_mm": [0, 400, 450], "flux_rgb": [0.4, 0.4, 0.4]},
-    {"name": "west", "channel": 2, "model": "near", "position_mm": [-400, 0, 450], "flux_rgb": [0.4, 0.4, 0.4]},
-    {"name": "south", "channel": 3, "model": "near", "position_mm": [0, -400, 450], "flux_rgb": [0.4, 0.4, 0.4]}]
+    {"name": "east", "channel": 0, "model": "distant", "direction": [0.6, 0, 0.8], "flux_rgb": [0.4, 0.4, 0.4]},
+    {"name": "north", "channel": 1, "model": "distant", "direction": [0, 0.6, 0.8], "flux_rgb": [0.4, 0.4, 0.4]},
+    {"name": "west", "channel": 2, "model": "distant", "direction": [-0.6, 0, 0.8], "flux_rgb": [0.4, 0.4, 0.4]},
+    {"name": "south", "channel": 3, "model": "distant", "direction": [0, -0.6, 0.8], "flux_rgb": [0.4, 0.4, 0.4]}]
 })";
 constexpr const char* kScene = R"({
   "schema": "sateen.scene/1", "rig": "rig.json",
-  "surface": {"shape": "dome", "max_slope_deg": 30}, "albedo": {"min": 0.2, "max": 0.8}
+  "surface": {"shape": "sphere", "radius_mm": 240, "edge_deg": 30},
+  "materials": {"surface": {"texture": {"kind": "waves", "min": 0.2, "max": 0.8, "period_mm": 100}}}
 })";
 
 class SolveCommand : public ::testing::Test {
@@ -46,7 +48,7 @@ class SolveCommand : public ::testing::Test {
   void SetUp() override {
     WriteText(Path("rig.json"), kRig);
     WriteText(Path("scene.json"), kScene);
-    const RunResult run = Simulate({Path("scene.json"), "-o", Path("session")});
+    const RunResult run = Simulate({Path("scene.json"), "-o", Path("session"), "--linear"});
     ASSERT_EQ(run.exit_status, 0) << run.log;
   }
 
@@ -205,6 +207,87 @@ TEST_F(SolveCommand, TheErrorMapOfAnEarlierSolveDoesNotStay) {
 
   EXPECT_FALSE(fs::exists(Path("maps/error.exr")));
   EXPECT_TRUE(fs::exists(Path("maps/normal.exr")));
+}
+
+TEST_F(SolveCommand, AMeanErrorWithinTheLimitPasses) {
+  const RunResult run =
+      Solve({Path("session"), "-o", Path("maps"), "--fail-above", "0.001", "--json"});
+
+  EXPECT_EQ(run.exit_status, 0);  // noiseless: PrintsTheFixedNamesAsJson
+  EXPECT_THAT(run.log, IsEmpty());
+  EXPECT_EQ(run.Json().at("fail_above_deg"), 0.001);
+  EXPECT_EQ(run.Json().at("passed"), true);
+
+  const RunResult unasked = Solve({Path("session"), "-o", Path("maps"), "--json"});
+  EXPECT_FALSE(unasked.Json().contains("fail_above_deg"));
+  EXPECT_FALSE(unasked.Json().contains("passed"));
+}
+
+TEST_F(SolveCommand, AMeanErrorAboveTheLimitFailsAfterWritingAll) {
+  // The lights of east and north as each other's: normals come out mirrored.
+  std::string swapped = kRig;
+  swapped.replace(swapped.find("[0.6, 0, 0.8]"), 13, "[0, 0.6, 0.8]");
+  swapped.replace(swapped.rfind("[0, 0.6, 0.8]"), 13, "[0.6, 0, 0.8]");
+  WriteText(Path("swapped.json"), swapped);
+
+  const RunResult run = Solve({Path("session"), "-o", Path("maps"), "--rig", Path("swapped.json"),
+                               "--fail-above", "0.05", "--json"});
+
+  EXPECT_EQ(run.exit_status, 3);
+  EXPECT_EQ(run.log, fmt::format("sateen solve: mean angular error {:.4g} deg is above "
+                                 "--fail-above 0.05\n",
+                                 run.Json().at("angular_error_deg").at("mean").get<double>()));
+  EXPECT_EQ(run.Json().at("passed"), false);
+  EXPECT_TRUE(fs::exists(Path("maps/error.exr")));
+  std::ifstream record(Path("maps/solve.json"));
+  EXPECT_EQ(nlohmann::json::parse(record), run.Json());
+}
+
+TEST(Passed, NoNumberIsNotWithinALimit) {
+  cli::SolveArgs args;
+  cli::SolveOutcome outcome;
+  EXPECT_TRUE(cli::Passed(args, outcome));
+  args.fail_above_deg = 2.0;
+  EXPECT_FALSE(cli::Passed(args, outcome));
+  outcome.angular_error_deg = ErrorStatistics{.count = 1, .mean = 2.0};
+  EXPECT_TRUE(cli::Passed(args, outcome));
+  outcome.angular_error_deg->mean = std::nextafter(2.0, 3.0);
+  EXPECT_FALSE(cli::Passed(args, outcome));
+  outcome.angular_error_deg->mean = std::nan("");
+  EXPECT_FALSE(cli::Passed(args, outcome));
+}
+
+TEST_F(SolveCommand, ALimitWithNothingToCompareFails) {
+  Image3 unknown = ReadImage3(Path("session/truth/normal.exr")).value();
+  unknown = Image3(unknown.Size());  // zero: not known
+  ASSERT_TRUE(WriteExr(Path("session/truth/normal.exr"), unknown));
+
+  const RunResult run = Solve({Path("session"), "-o", Path("maps"), "--fail-above", "5", "--json"});
+
+  EXPECT_EQ(run.exit_status, 3);
+  EXPECT_THAT(run.log, HasSubstr("no solved pixel has truth"));
+  EXPECT_EQ(run.Json().at("passed"), false);
+}
+
+TEST_F(SolveCommand, ALimitWithoutTruthIsRefusedBeforeTheSolve) {
+  fs::remove_all(Path("session/truth"));
+
+  const RunResult run = Solve({Path("session"), "-o", Path("maps"), "--fail-above", "5"});
+
+  EXPECT_EQ(run.exit_status, 3);
+  EXPECT_THAT(run.log, HasSubstr("the capture has no truth; --fail-above needs truth/normal.exr, "
+                                 "normal_gt.exr or Normal_gt.mat"));
+  EXPECT_THAT(run.out, IsEmpty());
+  EXPECT_FALSE(fs::exists(Path("maps")));
+}
+
+TEST_F(SolveCommand, ALimitThatIsNoAngleIsAUsageError) {
+  for (const char* angle : {"0", "-1", "180.5", "inf", "nan", "1deg", "x", ""}) {
+    const RunResult run = Solve({Path("session"), "-o", Path("m"), "--fail-above", angle});
+    EXPECT_EQ(run.exit_status, 2) << angle;
+    EXPECT_THAT(run.log, HasSubstr("--fail-above")) << angle;
+  }
+  EXPECT_FALSE(fs::exists(Path("m")));
 }
 
 TEST_F(SolveCommand, CancellingLeavesNothing) {

@@ -1,0 +1,143 @@
+#include "cli/simulated_session.h"
+
+#include <utility>
+
+#include "core/sha256.h"
+#include "imaging/dng.h"
+#include "imaging/image_io.h"
+#include "simulation/random.h"
+#include "simulation/render.h"
+
+namespace sateen::cli {
+namespace {
+
+constexpr const char* kDarkFrame = "dark";
+constexpr uint64_t kSensorStream = 1000;  // one stream of noise a frame from here on
+
+class SessionWriter {
+ public:
+  SessionWriter(const SceneFile& file, FrameFormat format, const Task& task, OutputFolder& folder)
+      : file_(file), format_(format), task_(task), folder_(folder) {
+    session_.kind = file.kind;
+    session_.table_from_sheet = file.table_from_sheet;
+  }
+
+  Status Write() {
+    const Lights& lights = file_.scene.rig.lights;
+    task_.BeginStage("geometry", file_.scene.rig.camera->size_px.height);
+    Result<SceneRenderer> renderer = SceneRenderer::Create(file_.scene, task_);
+    if (!renderer) {
+      return tl::unexpected(renderer.error());
+    }
+    Status status = WriteTruth(renderer->Maps());
+    for (size_t k = 0; k <= lights.size() && status; ++k) {
+      const std::optional<size_t> light = k < lights.size() ? std::optional(k) : std::nullopt;
+      status = WriteFrame(*renderer, light);
+    }
+    return status.and_then([&] { return WriteRecord(); });
+  }
+
+ private:
+  Status WriteTruth(const SurfaceMaps& maps) {
+    return WriteExr(folder_.Stage("truth/normal.exr"), maps.normal)
+        .and_then([&] { return WriteExr(folder_.Stage("truth/albedo.exr"), maps.albedo); })
+        .and_then([&] { return WriteExr(folder_.Stage("truth/height.exr"), maps.point_mm[2]); });
+  }
+
+  Status WriteFrame(SceneRenderer& renderer, std::optional<size_t> light) {
+    const std::string name = light ? file_.scene.rig.lights[*light].name : kDarkFrame;
+    task_.BeginStage("rendering " + name, file_.scene.rig.camera->size_px.height);
+    const Result<RenderedFrame> frame = renderer.Render(light, task_);
+    if (!frame) {
+      return tl::unexpected(frame.error());
+    }
+    const std::string exr = "frames/" + name + ".exr";
+    const std::string dng = "frames/" + name + ".dng";
+    const bool is_raw = format_ == FrameFormat::kRawDng;
+    folder_.Retire(is_raw ? exr : dng);
+    const std::string& written = is_raw ? dng : exr;
+    const std::filesystem::path staged = folder_.Stage(written);
+    Status status =
+        is_raw ? WriteRaw(staged, frame->radiance, light) : WriteExr(staged, frame->radiance);
+    if (status && light) {
+      status = WritePng8(folder_.Stage("truth/lit/" + name + ".png"), frame->lit);
+    }
+    if (!status) {
+      return status;
+    }
+    const Result<std::string> sha256 = Sha256OfFile(staged);
+    if (!sha256) {
+      return tl::unexpected(sha256.error());
+    }
+    SessionFrame record{.role = light ? FrameRole::kLit : FrameRole::kDark,
+                        .light = light ? name : "",
+                        .file = written,
+                        .sha256 = *sha256};
+    if (is_raw) {
+      record.exposure_s = file_.exposure.exposure_s;
+      record.f_number = file_.exposure.f_number;
+      record.iso = file_.exposure.iso;
+    }
+    exposure_ = record.Exposure();
+    session_.frames.push_back(std::move(record));
+    return {};
+  }
+
+  Status WriteRaw(const std::filesystem::path& path, const Image3& radiance,
+                  std::optional<size_t> light) {
+    const uint64_t stream = kSensorStream + (light ? *light : file_.scene.rig.lights.size());
+    const Result<Image<uint16_t>> mosaic =
+        Expose(file_.sensor, radiance, HashOf(file_.scene.seed, stream), task_);
+    if (!mosaic) {
+      return tl::unexpected(mosaic.error());
+    }
+    return WriteDng(path, *mosaic,
+                    {.cfa = file_.sensor.cfa,
+                     .black = file_.sensor.black_dn,
+                     .white = file_.sensor.white_dn,
+                     .make = "Sateen",
+                     .model = file_.scene.rig.camera->model,
+                     .exposure_s = file_.exposure.exposure_s,
+                     .f_number = file_.exposure.f_number,
+                     .iso = file_.exposure.iso});
+  }
+
+  // The rig in the units of the frames, and the record that names it.
+  Status WriteRecord() {
+    Rig rig = file_.scene.rig;
+    if (format_ == FrameFormat::kRawDng) {
+      for (Light& light : rig.lights) {
+        light.flux_rgb /= file_.sensor.full_scale * exposure_;
+      }
+      Response response{.black = file_.sensor.black_dn, .white = file_.sensor.white_dn};
+      if (file_.sensor.full_well_electrons) {
+        const double gain = (response.white - response.black) / *file_.sensor.full_well_electrons;
+        response.gain_dn_per_electron = gain;
+        response.read_noise_dn = gain * file_.sensor.read_noise_electrons;
+      }
+      rig.response = response;
+    }
+    const std::string rig_json = RigToJson(rig);
+    session_.rig = "rig.json";
+    session_.rig_sha256 = Sha256(rig_json);
+    return folder_.WriteText("rig.json", rig_json)
+        .and_then([&] { return folder_.WriteText("truth/rig.json", rig_json); })
+        .and_then([&] { return folder_.WriteText("session.json", SessionToJson(session_)); });
+  }
+
+  const SceneFile& file_;
+  FrameFormat format_;
+  const Task& task_;
+  OutputFolder& folder_;
+  Session session_;
+  double exposure_ = 1.0;  // H of every frame
+};
+
+}  // namespace
+
+Status StageSimulatedSession(const SceneFile& file, FrameFormat format, const Task& task,
+                             OutputFolder& folder) {
+  return SessionWriter(file, format, task, folder).Write();
+}
+
+}  // namespace sateen::cli
