@@ -23,7 +23,8 @@ enum Stream : uint64_t { kFlickerStream = 1, kYarnStream = 2, kBounceStream = 3 
 uint64_t StreamSeed(uint64_t seed, Stream stream) { return HashOf(seed, stream); }
 
 Eigen::Vector3d VectorAt(const Image3& image, size_t pixel) {
-  return {image[0].pixels[pixel], image[1].pixels[pixel], image[2].pixels[pixel]};
+  return Eigen::Vector3f(image[0].pixels[pixel], image[1].pixels[pixel], image[2].pixels[pixel])
+      .cast<double>();
 }
 
 void SetVector(Image3& image, size_t pixel, const Eigen::Vector3d& value) {
@@ -168,7 +169,8 @@ class PixelShader {
     if (plain_ || material.specular == nullptr) {
       return rho;
     }
-    return rho + std::numbers::pi * material.specular->Evaluate(n, l, (eye_mm_ - x_mm).normalized());
+    return rho +
+           std::numbers::pi * material.specular->Evaluate(n, l, (eye_mm_ - x_mm).normalized());
   }
 
   [[nodiscard]] bool SeesLight(const Eigen::Vector3d& x_mm, const Eigen::Vector3d& l) const {
@@ -207,7 +209,7 @@ class PixelShader {
     const uint64_t seed = HashOf(StreamSeed(scene_.seed, kBounceStream), pixel);
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
     for (int ray = 0; ray < side * side; ++ray) {  // one direction in each cell of a square
-      const auto counter = static_cast<uint64_t>(2 * ray);
+      const auto counter = 2 * static_cast<uint64_t>(ray);
       const double a = (ray % side + UniformDeviate(seed, counter)) / side;
       const double b = (ray / side + UniformDeviate(seed, counter + 1)) / side;  // NOLINT: rows
       const double radius = std::sqrt(a);

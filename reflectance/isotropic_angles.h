@@ -1,0 +1,33 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <algorithm>
+
+namespace sateen {
+
+// What an isotropic model sees of n, l and v: cosines, those that models use as such in [0, 1].
+// `n_l` keeps its sign; `h` is the half vector.
+struct IsotropicAngles {
+  double n_l;
+  double n_v;
+  double n_h;
+  double l_h;
+};
+
+// The order of the arguments of max turns NaN into 0.
+inline double UnitCosine(double x) { return std::min(std::max(0.0, x), 1.0); }
+
+inline IsotropicAngles AnglesBetween(const Eigen::Vector3d& n, const Eigen::Vector3d& l,
+                                     const Eigen::Vector3d& v) {
+  const Eigen::Vector3d h = (l + v).normalized();
+  return {n.dot(l), UnitCosine(n.dot(v)), UnitCosine(n.dot(h)), UnitCosine(l.dot(h))};
+}
+
+/// (1 - x)^5, the angular part of Schlick's Fresnel term
+inline double SchlickWeight(double x) {
+  const double y = 1.0 - x;
+  return y * y * y * y * y;
+}
+
+}  // namespace sateen
