@@ -4,6 +4,7 @@
 #include <iostream>
 #include <new>
 
+#include "cli/bench_simulate.h"
 #include "cli/bench_solve.h"
 #include "cli/simulate.h"
 #include "cli/solve.h"
@@ -31,6 +32,8 @@ int Run(int argc, char** argv) {
   bench->require_subcommand(1);
   sateen::cli::BenchSolveArgs bench_solve;
   sateen::cli::AddBenchSolve(*bench, bench_solve);
+  sateen::cli::BenchSimulateArgs bench_simulate;
+  sateen::cli::AddBenchSimulate(*bench, bench_simulate);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
@@ -45,6 +48,8 @@ int Run(int argc, char** argv) {
     status = RunSolve(solve, task, std::cout, std::cerr);
   } else if (app.got_subcommand("simulate")) {
     status = RunSimulate(simulate, task, std::cout, std::cerr);
+  } else if (bench->got_subcommand("simulate")) {
+    status = RunBenchSimulate(bench_simulate, task, std::cout, std::cerr);
   } else {
     status = RunBenchSolve(bench_solve, task, std::cout, std::cerr);
   }

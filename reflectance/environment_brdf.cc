@@ -20,8 +20,10 @@ Eigen::Vector2d IntegrateEnvironmentBrdf(double n_v, double alpha) {
   const double v_x = std::sqrt(1.0 - n_v * n_v);
   Eigen::Vector2d sum = Eigen::Vector2d::Zero();
   for (int i = 0; i < kPolarSteps; ++i) {
-    const double u = (i + 0.5) / kPolarSteps;
-    const double n_m = std::sqrt((1.0 - u) / (1.0 + (alpha * alpha - 1.0) * u));
+    // The drawn number u = 1 - s^2: denser where normals lie flat, which is where most of the error
+    // of equal steps in u would come from. Its weight is du / ds = 2 s.
+    const double s = (i + 0.5) / kPolarSteps;
+    const double n_m = s / std::sqrt(alpha * alpha + (1.0 - alpha * alpha) * s * s);
     const double m_x = std::sqrt(std::max(1.0 - n_m * n_m, 0.0));
     for (int j = 0; j < kAzimuthSteps; ++j) {
       const double phi = std::numbers::pi * (j + 0.5) / kAzimuthSteps;
@@ -30,7 +32,8 @@ Eigen::Vector2d IntegrateEnvironmentBrdf(double n_v, double alpha) {
       if (n_l <= 0.0) {
         continue;
       }
-      const double w = 4.0 * GgxVisibility(n_l, n_v, alpha) * n_l * v_m / n_m;  // (3)
+      // (3)
+      const double w = 2.0 * s * 4.0 * GgxVisibility(n_l, n_v, alpha) * n_l * v_m / n_m;
       const double fresnel = SchlickWeight(std::min(v_m, 1.0));
       sum += w * Eigen::Vector2d(1.0 - fresnel, fresnel);  // (2)
     }
