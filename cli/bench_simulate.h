@@ -1,6 +1,7 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <filesystem>
 #include <iosfwd>
 #include <string>
 #include <vector>
@@ -15,6 +16,7 @@ struct BenchSimulateArgs {
   int height = 3264;       // [px]
   int switch_width = 512;  // [px] of the frames on which each switch is tried
   int threads = 0;
+  std::filesystem::path pictures;  // empty: none
   bool json = false;
 };
 

@@ -9,7 +9,8 @@
 namespace sateen::cli {
 namespace {
 
-constexpr int kGap = 4;               // [px] between panels
+constexpr int kGap = 4;  // [px] between panels
+constexpr uint8_t kPaperWhite = 255;
 constexpr uint8_t kUnknownGrey = 96;  // pixels without a value
 constexpr double kWhitePercentile = 0.995;
 
@@ -19,24 +20,6 @@ uint8_t Byte(float value) {
 
 Rgb8 MakeRgb8(ImageSize size, uint8_t fill = 0) {
   return {Image<uint8_t>(size, fill), Image<uint8_t>(size, fill), Image<uint8_t>(size, fill)};
-}
-
-// The value that is to be shown as white; 1 for an image without light.
-float WhiteOf(const Image3& linear) {
-  std::vector<float> peaks;
-  for (size_t p = 0; p < linear[0].pixels.size(); ++p) {
-    const float peak = std::max({linear[0].pixels[p], linear[1].pixels[p], linear[2].pixels[p]});
-    if (peak > 0.0F && std::isfinite(peak)) {
-      peaks.push_back(peak);
-    }
-  }
-  if (peaks.empty()) {
-    return 1.0F;
-  }
-  const auto place = peaks.begin() + static_cast<std::ptrdiff_t>(
-                                         kWhitePercentile * static_cast<double>(peaks.size() - 1));
-  std::nth_element(peaks.begin(), place, peaks.end());
-  return *place;
 }
 
 // Black, purple, red, yellow, white at equal steps.
@@ -58,12 +41,13 @@ std::array<uint8_t, 3> HeatColor(float t) {
 
 // The mean of each factor x factor block.
 Image<uint8_t> Shrink(const Image<uint8_t>& image, int factor) {
-  Image<uint8_t> small(image.width / factor, image.height / factor);
+  Image<uint8_t> small(std::max(1, image.width / factor), std::max(1, image.height / factor));
   for (int y = 0; y < small.height; ++y) {
     for (int x = 0; x < small.width; ++x) {
       int sum = 0;
       for (int block = 0; block < factor * factor; ++block) {
-        sum += image.At(x * factor + block % factor, y * factor + block / factor);
+        sum += image.At(x * factor + block % factor,
+                        std::min(y * factor + block / factor, image.height - 1));
       }
       small.At(x, y) = static_cast<uint8_t>(sum / (factor * factor));
     }
@@ -86,8 +70,24 @@ std::array<Image<uint16_t>, 3> EncodeNormal16(const Image3& normal) {
   return encoded;
 }
 
-Rgb8 ShowLinear(const Image3& linear) {
-  const float white = WhiteOf(linear);
+float WhiteOf(const Image3& linear) {
+  std::vector<float> peaks;
+  for (size_t p = 0; p < linear[0].pixels.size(); ++p) {
+    const float peak = std::max({linear[0].pixels[p], linear[1].pixels[p], linear[2].pixels[p]});
+    if (peak > 0.0F && std::isfinite(peak)) {
+      peaks.push_back(peak);
+    }
+  }
+  if (peaks.empty()) {
+    return 1.0F;
+  }
+  const auto place = peaks.begin() + static_cast<std::ptrdiff_t>(
+                                         kWhitePercentile * static_cast<double>(peaks.size() - 1));
+  std::nth_element(peaks.begin(), place, peaks.end());
+  return *place;
+}
+
+Rgb8 ShowLinear(const Image3& linear, float white) {
   Rgb8 shown = MakeRgb8(linear.Size());
   for (size_t c = 0; c < 3; ++c) {
     std::transform(linear[c].pixels.begin(), linear[c].pixels.end(), shown[c].pixels.begin(),
@@ -121,22 +121,40 @@ Rgb8 ShowHeat(const Image<float>& values, float top, const Image<uint8_t>& shown
   return heat;
 }
 
-Rgb8 SideBySide(const std::vector<Rgb8>& panels, int max_width) {
+Rgb8 Shrunk(const Rgb8& panel, int max_width) {
+  const int factor = std::max(1, (panel[0].width + max_width - 1) / max_width);
+  return {Shrink(panel[0], factor), Shrink(panel[1], factor), Shrink(panel[2], factor)};
+}
+
+Rgb8 ContactSheet(const std::vector<Rgb8>& panels, int columns) {
   SATEEN_CHECK(!panels.empty());
   const ImageSize size = panels[0][0].Size();
-  const int factor = std::max(1, (size.width + max_width - 1) / max_width);
-  const ImageSize small{std::max(1, size.width / factor), std::max(1, size.height / factor)};
   const auto count = static_cast<int>(panels.size());
-  Rgb8 sheet = MakeRgb8({count * (small.width + kGap) - kGap, small.height}, 255);
+  const int across = std::min(columns, count);
+  const int down = (count + columns - 1) / columns;
+  Rgb8 sheet = MakeRgb8({across * (size.width + kGap) - kGap, down * (size.height + kGap) - kGap},
+                        kPaperWhite);
   for (int i = 0; i < count; ++i) {
+    const int left = i % columns * (size.width + kGap);
+    const int top = i / columns * (size.height + kGap);
     for (size_t c = 0; c < 3; ++c) {
-      const Image<uint8_t> panel = Shrink(panels[static_cast<size_t>(i)][c], factor);
-      for (int y = 0; y < panel.height; ++y) {
-        std::copy_n(&panel.At(0, y), panel.width, &sheet[c].At(i * (small.width + kGap), y));
+      const Image<uint8_t>& panel = panels[static_cast<size_t>(i)][c];
+      SATEEN_CHECK(panel.Size() == size);
+      for (int y = 0; y < size.height; ++y) {
+        std::copy_n(&panel.At(0, y), size.width, &sheet[c].At(left, top + y));
       }
     }
   }
   return sheet;
+}
+
+Rgb8 SideBySide(const std::vector<Rgb8>& panels, int max_width) {
+  std::vector<Rgb8> small;
+  small.reserve(panels.size());
+  for (const Rgb8& panel : panels) {
+    small.push_back(Shrunk(panel, max_width));
+  }
+  return ContactSheet(small, static_cast<int>(small.size()));
 }
 
 }  // namespace sateen::cli

@@ -1,7 +1,10 @@
 #include "cli/simulated_session.h"
 
+#include <algorithm>
 #include <utility>
+#include <vector>
 
+#include "cli/pictures.h"
 #include "core/sha256.h"
 #include "imaging/dng.h"
 #include "imaging/image_io.h"
@@ -12,6 +15,8 @@ namespace sateen::cli {
 namespace {
 
 constexpr const char* kDarkFrame = "dark";
+constexpr int kPanelPx = 240;  // width in the overview
+constexpr int kPanelColumns = 5;
 constexpr uint64_t kSensorStream = 1000;  // one stream of noise a frame from here on
 
 class SessionWriter {
@@ -34,7 +39,9 @@ class SessionWriter {
       const std::optional<size_t> light = k < lights.size() ? std::optional(k) : std::nullopt;
       status = WriteFrame(*renderer, light);
     }
-    return status.and_then([&] { return WriteRecord(); });
+    return status.and_then([&] { return WriteOverview(renderer->Maps()); }).and_then([&] {
+      return WriteRecord();
+    });
   }
 
  private:
@@ -57,6 +64,10 @@ class SessionWriter {
     folder_.Retire(is_raw ? exr : dng);
     const std::string& written = is_raw ? dng : exr;
     const std::filesystem::path staged = folder_.Stage(written);
+    if (panels_.empty()) {
+      white_ = WhiteOf(frame->radiance);
+    }
+    panels_.push_back(Shrunk(ShowLinear(frame->radiance, white_), kPanelPx));
     Status status =
         is_raw ? WriteRaw(staged, frame->radiance, light) : WriteExr(staged, frame->radiance);
     if (status && light) {
@@ -102,6 +113,21 @@ class SessionWriter {
                      .iso = file_.exposure.iso});
   }
 
+  // To look at: all frames, equally exposed, then normals, albedo and height.
+  Status WriteOverview(const SurfaceMaps& maps) {
+    Image<float> height = maps.point_mm[2];
+    const auto [lowest, highest] = std::ranges::minmax(height.pixels);
+    for (float& z : height.pixels) {
+      z -= lowest;
+    }
+    const Image<uint8_t> everywhere(height.Size(), 255);
+    for (const Rgb8& panel : {ShowNormal(maps.normal), ShowLinear(maps.albedo, 1.0F),
+                              ShowHeat(height, highest - lowest, everywhere)}) {
+      panels_.push_back(Shrunk(panel, kPanelPx));
+    }
+    return WritePng8(folder_.Stage("overview.png"), ContactSheet(panels_, kPanelColumns));
+  }
+
   // The rig in the units of the frames, and the record that names it.
   Status WriteRecord() {
     Rig rig = file_.scene.rig;
@@ -131,6 +157,8 @@ class SessionWriter {
   OutputFolder& folder_;
   Session session_;
   double exposure_ = 1.0;  // H of every frame
+  std::vector<Rgb8> panels_;
+  float white_ = 1.0F;
 };
 
 }  // namespace

@@ -15,7 +15,8 @@ namespace sateen {
 //
 // where R is the directional albedo of f at rho = 1. That stays reciprocal, leaves f alone where
 // it has room in both directions, and needs no fit: s <= 1 makes the directional albedo of f' at
-// most rho s(n.v) R(n.v) <= room(v). Constructing such a model fills the tables of s.
+// most rho s(n.v) R(n.v) <= room(v). Constructing such a model fills the tables of R; the room
+// keeps 0.003 back for their error.
 
 struct LambertSpec {
   Eigen::Vector3d albedo = Eigen::Vector3d::Constant(0.5);
@@ -106,9 +107,9 @@ struct MultiScatterSpec {
 ///     f_1 = (1 - 0.75 (1 - n.l)^5) (1 - 0.75 (1 - n.v)^5)
 ///     f_b = (34.5 g^2 - 59 g + 24.5) l.h 2^(-max(73.2 g - 21.2, 8.9) sqrt(n.h))
 ///
-/// As published its directional albedo exceeds rho at grazing angles: 1.14 rho at most, at g = 0.
+/// As published its directional albedo exceeds rho at grazing angles: 1.16 rho at most, at g = 0.
 /// Source: Chan 2018, eqs. 64 to 69 and listing 1; 1-30
-/// Cost of construction: about 40 ms when energy_safe.
+/// Cost of construction: about 25 ms when energy_safe.
 class MultiScatterDiffuse final : public Brdf {
  public:
   explicit MultiScatterDiffuse(const MultiScatterSpec& spec);

@@ -10,20 +10,20 @@ namespace sateen {
 /// The two parts of the directional albedo of Ggx (specular.h), which is linear in f0:
 ///
 ///     R(n.v) = integral over l of f_r (n.l) dl = f0 scale + bias                             (1)
-///     scale  = mean over m of w (1 - (v.m)^5'),  bias = mean over m of w (v.m)^5'            (2)
-///     w      = 4 V (n.l) (v.m) / (n.m),  l = 2 (v.m) m - v,  x^5' = (1 - x)^5                (3)
+///     scale  = mean over m of w (1 - c),  bias = mean over m of w c,  c = (1 - v.m)^5         (2)
+///     w      = 4 V (n.l) (v.m) / (n.m),  l = 2 (v.m) m - v                                   (3)
 ///
 /// with normals m drawn in proportion to D(m) (n.m), on a midpoint grid in place of at random.
 ///
 /// n_v      [0, 1], at least 1e-4 inside; alpha [0, 1], where 0 is a mirror
 /// Returns  {scale, bias}
-/// Cost     2,048 normals; about 50 us
+/// Cost     2,048 normals; about 25 us
 /// Source   Karis 2013, "Real Shading in Unreal Engine 4"; Chan 2018, sections 4.7 and 5.3
 [[nodiscard]] Eigen::Vector2d IntegrateEnvironmentBrdf(double n_v, double alpha);
 
 // The same from a table of 33 x 33 nodes over n.v and alpha, interpolated between them. By
 // reciprocity it also tells what share of the light from l is lost to the specular reflection.
-// The constructor fills the table in about 50 ms: build one and share it.
+// The constructor fills the table in about 30 ms: build one and share it.
 class EnvironmentBrdf {
  public:
   EnvironmentBrdf();

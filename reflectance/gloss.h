@@ -4,8 +4,9 @@ namespace sateen {
 
 // Scales of roughness, and what each calls the alpha of a microfacet distribution (microfacet.h).
 //
-// Neubelt and Pettineo (2013) store alpha itself under the name roughness. Gloss runs from 0, rough,
-// to 1, smooth. None of these functions clamps: outside the domain the result is out of range.
+// Neubelt and Pettineo (2013) store alpha itself under the name roughness. Gloss runs from 0,
+// rough, to 1, smooth. None of these functions clamps: outside the domain the result is out of
+// range.
 
 /// alpha = sqrt(2 / (1 + 2^(18 g)))                        g in [0, 1]; alpha in [0.00276213, 1]
 /// Source: Chan 2018, eq. 2 (Call of Duty: WWII); 1-01

@@ -15,7 +15,8 @@ namespace sateen {
 namespace {
 
 constexpr int kRenderRows = 8;
-constexpr double kFarAway_mm = 1e6;  // a distant light, for shadows
+constexpr double kFarAway_mm = 1e6;   // a distant light, for shadows
+constexpr double kBounceStep = 1e-3;  // of the surface's detail; Monte-Carlo error is larger
 
 // Streams of random numbers that must not meet.
 enum Stream : uint64_t { kFlickerStream = 1, kYarnStream = 2, kBounceStream = 3 };
@@ -223,7 +224,7 @@ class PixelShader {
 
   // The light that the Lambertian body at the end of a ray sends back.
   [[nodiscard]] Eigen::Vector3d DirectFrom(const Ray& ray) const {
-    const std::optional<double> t = NextHit(*scene_.surface, ray, kFarAway_mm);
+    const std::optional<double> t = NextHit(*scene_.surface, ray, kFarAway_mm, kBounceStep);
     if (!t) {
       return Eigen::Vector3d::Zero();
     }

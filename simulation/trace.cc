@@ -9,7 +9,7 @@ namespace {
 constexpr int kMaxTraceSteps = 10000;
 constexpr int kNewtonSteps = 8;
 constexpr double kTouching_mm = 1e-10;
-constexpr double kSmallestStep = 1e-5;  // of the detail
+constexpr double kShadowEdge = 1e-5;  // of the detail
 
 struct Gap {
   double height_mm;  // of the ray above the surface
@@ -22,10 +22,9 @@ Gap GapAt(const Surface& surface, const Ray& ray, double t) {
   return {at.z() - point.height_mm, ray.direction.z() - point.slope.dot(ray.direction.head<2>())};
 }
 
-// The fastest at which the gap can close.
+// The fastest at which the gap can close; negative where the ray rises faster than any slope.
 double ClosingRate(const Surface& surface, const Ray& ray) {
-  return std::max(0.0, -ray.direction.z()) + surface.MaxSlope() * ray.direction.head<2>().norm() +
-         1e-12;
+  return surface.MaxSlope() * ray.direction.head<2>().norm() - ray.direction.z() + 1e-12;
 }
 
 }  // namespace
@@ -68,9 +67,13 @@ std::optional<double> FirstHit(const Surface& surface, const Ray& ray) {
   return t;
 }
 
-std::optional<double> NextHit(const Surface& surface, const Ray& ray, double distance_mm) {
+std::optional<double> NextHit(const Surface& surface, const Ray& ray, double distance_mm,
+                              double finest_step) {
   const double rate = ClosingRate(surface, ray);
-  const double smallest = kSmallestStep * surface.DetailMm();
+  if (rate <= 0.0) {
+    return std::nullopt;
+  }
+  const double smallest = finest_step * surface.DetailMm();
   const double highest = surface.HighestMm();
   double t = smallest;
   for (int step = 0; step < kMaxTraceSteps && t < distance_mm; ++step) {
@@ -89,7 +92,7 @@ std::optional<double> NextHit(const Surface& surface, const Ray& ray, double dis
 
 bool IsVisible(const Surface& surface, const Eigen::Vector3d& point_mm,
                const Eigen::Vector3d& to_light, double distance_mm) {
-  return !NextHit(surface, {point_mm, to_light}, distance_mm).has_value();
+  return !NextHit(surface, {point_mm, to_light}, distance_mm, kShadowEdge).has_value();
 }
 
 }  // namespace sateen

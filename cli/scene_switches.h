@@ -1,0 +1,29 @@
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string_view>
+#include <vector>
+
+#include "core/error.h"
+#include "simulation/scene.h"
+#include "simulation/sensor.h"
+
+namespace sateen::cli {
+
+// One key of a scene file turned on in a scene that has nothing else: what it costs, what it does to
+// a solve and what it looks like (docs/simulation.md).
+struct SceneSwitch {
+  std::string_view key;   // as in a scene file, with its value
+  std::string_view file;  // stem of its picture
+  std::function<void(Scene&)> turn_on = [](Scene&) {};
+  std::optional<Sensor> sensor = std::nullopt;  // nothing: radiance as it is
+};
+
+// Waves under ten near lights, Lambertian, attached shadows.
+[[nodiscard]] Result<Scene> PlainScene(ImageSize size);
+
+// The first turns nothing on.
+[[nodiscard]] std::vector<SceneSwitch> SceneSwitches();
+
+}  // namespace sateen::cli
