@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "reflectance/isotropic_angles.h"
 #include "reflectance/microfacet.h"
+#include "reflectance/range_check.h"
 
 namespace sateen {
 namespace {
@@ -12,31 +14,18 @@ namespace {
 constexpr double kLeastCosine = 1e-4;
 constexpr double kLeastAlpha = 1e-3;
 
-// The angles that an isotropic model depends on.
-struct Cosines {
-  Eigen::Vector3d h;
-  double n_l;
-  double n_v;
-  double n_h;
-  double v_h;
-};
-
-Cosines CosinesOf(const Eigen::Vector3d& n, const Eigen::Vector3d& l, const Eigen::Vector3d& v) {
-  const Eigen::Vector3d h = (l + v).normalized();
-  return {h, n.dot(l), std::max(n.dot(v), kLeastCosine), std::clamp(n.dot(h), kLeastCosine, 1.0),
-          std::max(v.dot(h), 0.0)};
+// Like AnglesBetween(), but n.v and n.h stay away from where the models divide by them.
+IsotropicAngles SafeAngles(const Eigen::Vector3d& n, const Eigen::Vector3d& l,
+                           const Eigen::Vector3d& v) {
+  IsotropicAngles at = AnglesBetween(n, l, v);
+  at.n_v = std::max(at.n_v, kLeastCosine);
+  at.n_h = std::max(at.n_h, kLeastCosine);
+  return at;
 }
 
 Status CheckSpecular(const Eigen::Vector3d& f0, double alpha) {
-  for (const double value : f0) {
-    if (!(value >= 0.0 && value <= 1.0)) {
-      return Fail(ErrorCode::kInvalidArgument, "f0 = {:g}; need 0 to 1", value);
-    }
-  }
-  if (!(alpha >= kLeastAlpha && alpha <= 1.0)) {
-    return Fail(ErrorCode::kInvalidArgument, "alpha = {:g}; need {:g} to 1", alpha, kLeastAlpha);
-  }
-  return {};
+  return CheckColour("f0", f0).and_then(
+      [&] { return CheckRange("alpha", alpha, kLeastAlpha, 1.0); });
 }
 
 }  // namespace
@@ -44,8 +33,8 @@ Status CheckSpecular(const Eigen::Vector3d& f0, double alpha) {
 Status SpecularSpec::Validate() const { return CheckSpecular(f0, alpha); }
 
 Status AnisotropicSpec::Validate() const {
-  if (!(anisotropy >= 0.0 && anisotropy <= 1.0)) {
-    return Fail(ErrorCode::kInvalidArgument, "anisotropy = {:g}; need 0 to 1", anisotropy);
+  if (Status status = CheckRange("anisotropy", anisotropy, 0.0, 1.0); !status) {
+    return status;
   }
   if (!(tangent.norm() > 1e-9 && tangent.allFinite())) {
     return Fail(ErrorCode::kInvalidArgument, "tangent has length {:g}; need more than 0",
@@ -56,17 +45,17 @@ Status AnisotropicSpec::Validate() const {
 
 Eigen::Vector3d Ggx::Evaluate(const Eigen::Vector3d& n, const Eigen::Vector3d& l,
                               const Eigen::Vector3d& v) const {
-  const Cosines at = CosinesOf(n, l, v);
+  const IsotropicAngles at = SafeAngles(n, l, v);
   if (at.n_l <= 0.0) {
     return Eigen::Vector3d::Zero();
   }
   return GgxDistribution(at.n_h, spec_.alpha) * GgxVisibility(at.n_l, at.n_v, spec_.alpha) *
-         SchlickFresnel(spec_.f0, at.v_h);
+         SchlickFresnel(spec_.f0, at.l_h);
 }
 
 Eigen::Vector3d GgxAnisotropic::Evaluate(const Eigen::Vector3d& n, const Eigen::Vector3d& l,
                                          const Eigen::Vector3d& v) const {
-  const Cosines at = CosinesOf(n, l, v);
+  const IsotropicAngles at = SafeAngles(n, l, v);
   if (at.n_l <= 0.0) {
     return Eigen::Vector3d::Zero();
   }
@@ -75,29 +64,30 @@ Eigen::Vector3d GgxAnisotropic::Evaluate(const Eigen::Vector3d& n, const Eigen::
   t = t.norm() > 1e-9 * spec_.tangent.norm() ? t.normalized() : n.unitOrthogonal();
   const Eigen::Vector3d b = n.cross(t);
   const double across = std::max(spec_.alpha * (1.0 - spec_.anisotropy), kLeastAlpha);
-  return GgxDistribution({t.dot(at.h), b.dot(at.h), at.n_h}, spec_.alpha, across) *
-         GgxVisibility(at.n_l, at.n_v, spec_.alpha) * SchlickFresnel(spec_.f0, at.v_h);
+  const Eigen::Vector3d h = (l + v).normalized();
+  return GgxDistribution({t.dot(h), b.dot(h), at.n_h}, spec_.alpha, across) *
+         GgxVisibility(at.n_l, at.n_v, spec_.alpha) * SchlickFresnel(spec_.f0, at.l_h);
 }
 
 Eigen::Vector3d Beckmann::Evaluate(const Eigen::Vector3d& n, const Eigen::Vector3d& l,
                                    const Eigen::Vector3d& v) const {
-  const Cosines at = CosinesOf(n, l, v);
+  const IsotropicAngles at = SafeAngles(n, l, v);
   if (at.n_l <= 0.0) {
     return Eigen::Vector3d::Zero();
   }
   return BeckmannDistribution(at.n_h, spec_.alpha) * BeckmannMasking(at.n_l, spec_.alpha) *
          BeckmannMasking(at.n_v, spec_.alpha) / (4.0 * at.n_l * at.n_v) *
-         SchlickFresnel(spec_.f0, at.v_h);
+         SchlickFresnel(spec_.f0, at.l_h);
 }
 
 Eigen::Vector3d Cloth::Evaluate(const Eigen::Vector3d& n, const Eigen::Vector3d& l,
                                 const Eigen::Vector3d& v) const {
-  const Cosines at = CosinesOf(n, l, v);
+  const IsotropicAngles at = SafeAngles(n, l, v);
   if (at.n_l <= 0.0) {
     return Eigen::Vector3d::Zero();
   }
   return VelvetDistribution(at.n_h, spec_.alpha) / (4.0 * (at.n_l + at.n_v - at.n_l * at.n_v)) *
-         SchlickFresnel(spec_.f0, at.v_h);
+         SchlickFresnel(spec_.f0, at.l_h);
 }
 
 }  // namespace sateen

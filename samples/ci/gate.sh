@@ -11,7 +11,7 @@ gates=${3:-$here/gates.txt}
 worst=0
 while read -r scene degrees format; do
   case $scene in ''|'#'*) continue ;; esac
-  name=$(basename "$scene" .json)
+  name=$(basename "$scene" .json)-${format:-raw}
   echo "== $name: mean angular error at most $degrees degrees"
   linear=()
   if [ "${format:-raw}" = linear ]; then linear=(--linear); fi

@@ -10,10 +10,18 @@ namespace {
 
 const Eigen::Vector3d kPlastic = Eigen::Vector3d::Constant(0.04);
 
+// Fine quadrature over normals and over light directions agree on 0.972441 and 0.963262. The row
+// prints 0.9725 and 0.9632, from a table of its own: each a little more than half a digit away.
 TEST(EnvironmentBrdf, Row1_24_WhatTheSpecularLeavesToTheDiffuse) {
+  const auto integral = [](double n_l) {
+    const Eigen::Vector2d terms = IntegrateEnvironmentBrdf(n_l, 0.5);
+    return 1.0 - 0.04 * terms[0] - terms[1];
+  };
+  EXPECT_NEAR(integral(1.0), 0.972441, 5e-6);
+  EXPECT_NEAR(integral(0.5), 0.963262, 5e-6);
   const EnvironmentBrdf table;
-  EXPECT_NEAR(table.DiffuseShare(1.0, kPlastic, 0.5)[0], 0.9725, 5e-5);
-  EXPECT_NEAR(table.DiffuseShare(0.5, kPlastic, 0.5)[0], 0.9632, 5e-5);
+  EXPECT_NEAR(table.DiffuseShare(1.0, kPlastic, 0.5)[0], 0.9725, 1e-4);
+  EXPECT_NEAR(table.DiffuseShare(0.5, kPlastic, 0.5)[0], 0.9632, 1e-4);
 }
 
 // The first slice of the table of row 1-22, with its tolerance.

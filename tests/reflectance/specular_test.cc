@@ -125,6 +125,21 @@ TEST(Specular, IsReciprocalAndColouredByItsFresnel) {
   }
 }
 
+TEST(Specular, NoneGivesBackMoreThanArrives) {
+  const Ggx ggx({.f0 = kMirror, .alpha = 0.4});
+  const GgxAnisotropic anisotropic({.f0 = kMirror, .alpha = 0.6, .anisotropy = 0.5});
+  const Beckmann beckmann({.f0 = kMirror, .alpha = 0.4});
+  const Cloth cloth({.f0 = kMirror, .alpha = 0.4});
+  for (const Brdf* brdf : {static_cast<const Brdf*>(&ggx), static_cast<const Brdf*>(&anisotropic),
+                           static_cast<const Brdf*>(&beckmann), static_cast<const Brdf*>(&cloth)}) {
+    for (const double n_v : {1.0, 0.7, 0.4, 0.2}) {
+      const double share = DirectionalAlbedo(*brdf, kUp, ViewAt(n_v))[0];
+      EXPECT_LT(share, 1.0) << n_v;
+      EXPECT_GT(share, 0.05) << n_v;
+    }
+  }
+}
+
 TEST(Specular, AnisotropyFollowsTheYarn) {
   const GgxAnisotropic along_x({.alpha = 0.6, .anisotropy = 0.8});
   const GgxAnisotropic along_y(
