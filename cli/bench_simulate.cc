@@ -7,10 +7,10 @@
 #include <chrono>
 #include <filesystem>
 #include <limits>
-#include <nlohmann/json.hpp>
 #include <ostream>
 #include <utility>
 
+#include "cli/bench_simulate_report.h"
 #include "cli/pictures.h"
 #include "cli/scene_switches.h"
 #include "imaging/dng.h"
@@ -26,9 +26,9 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr double kBytesPerGb = 1e9;
-constexpr int kRepeats = 2;           // of a switch; the faster counts
-constexpr int kPictureWidthPx = 256;  // of each of two
-constexpr double kFullScale = 0.8;    // radiance that saturates the sensor
+constexpr int kRepeats = 2;         // of a switch; the faster counts
+constexpr int kBenchPanelPx = 171;  // of a picture of two or three
+constexpr double kFullScale = 0.8;  // radiance that saturates the sensor
 
 // A folder of its own for the frames, removed with all in it.
 class ScratchFolder {
@@ -103,6 +103,9 @@ class SimulateBench {
       if (status) {
         status = MeasureSwitch(one);
       }
+    }
+    if (status && !args_.pictures.empty()) {
+      status = DrawShapes();
     }
     if (!status) {
       return tl::unexpected(status.error());
@@ -223,7 +226,33 @@ class SimulateBench {
     const float white = WhiteOf(plain_frame_);
     const std::string file = (args_.pictures / fmt::format("{}.png", one.file)).string();
     return WritePng8(file, SideBySide({ShowLinear(plain_frame_, white), ShowLinear(frame, white)},
-                                      kPictureWidthPx));
+                                      kBenchPanelPx));
+  }
+
+  // Each shape: the frame of the last light, normals, height from black to white.
+  Status DrawShapes() {
+    for (const SceneShape& shape : SceneShapes()) {
+      const Result<Scene> scene = ShapeScene(shape, {args_.switch_width, args_.switch_width});
+      if (!scene) {
+        return tl::unexpected(scene.error());
+      }
+      Result<SceneRenderer> renderer = SceneRenderer::Create(*scene, Quiet());
+      if (!renderer) {
+        return tl::unexpected(renderer.error());
+      }
+      const Result<RenderedFrame> frame = renderer->Render(scene->rig.lights.size() - 1, Quiet());
+      if (!frame) {
+        return tl::unexpected(frame.error());
+      }
+      const std::vector<Rgb8> panels = {ShowLinear(frame->radiance),
+                                        ShowNormal(renderer->Maps().normal),
+                                        ShowRelief(renderer->Maps().point_mm[2])};
+      const std::string file = (args_.pictures / fmt::format("shape-{}.png", shape.file)).string();
+      if (Status status = WritePng8(file, SideBySide(panels, kBenchPanelPx)); !status) {
+        return status;
+      }
+    }
+    return {};
   }
 
   const BenchSimulateArgs& args_;
@@ -231,56 +260,6 @@ class SimulateBench {
   Image3 plain_frame_;  // of the last light, for the pictures
   SimulateBenchReport report_;
 };
-
-std::string SimulateText(const SimulateBenchReport& report) {
-  std::string text = fmt::format(
-      "A session of {} frames of {} x {} ({:.1f} megapixels), near lights, Lambertian, 14-bit "
-      "sensor\nwith noise, DNG files; {} threads\n\n  {:<10} {:>8}  {:>20}\n",
-      report.frames, report.size.width, report.size.height,
-      1e-6 * static_cast<double>(report.size.PixelCount()), report.threads, "step", "seconds",
-      "ns a pixel and frame");
-  for (const SimulateStage& stage : report.stages) {
-    text += fmt::format("  {:<10} {:>8.2f}  {:>20.1f}\n", stage.name, stage.seconds,
-                        stage.ns_per_pixel);
-  }
-  text += fmt::format("  {:<10} {:>8.2f}\n\nPeak memory {:.2f} GB\n\n", "all", report.seconds,
-                      report.peak_memory_gb);
-  text += fmt::format(
-      "What each switch of a scene costs, and what it does to a least-squares solve\n\n"
-      "  {:<28} {:>20}  {:>8}  {:>10}  {:>9}\n",
-      "switch", "ns a pixel and frame", "x plain", "mean [deg]", "p99 [deg]");
-  for (const SimulateSwitch& one : report.switches) {
-    text += fmt::format("  {:<28} {:>20.1f}  {:>8.2f}  {:>10.4f}  {:>9.4f}\n", one.name,
-                        one.ns_per_pixel, one.times_plain, one.angular_error_deg.mean,
-                        one.angular_error_deg.p99);
-  }
-  return text;
-}
-
-std::string SimulateJson(const SimulateBenchReport& report) {
-  nlohmann::ordered_json json = {
-      {"schema", "sateen.bench.simulate/1"},
-      {"size_px", {report.size.width, report.size.height}},
-      {"frames", report.frames},
-      {"threads", report.threads},
-      {"seconds", report.seconds},
-      {"peak_memory_gb", report.peak_memory_gb},
-      {"steps", nlohmann::ordered_json::array()},
-      {"switches", nlohmann::ordered_json::array()},
-  };
-  for (const SimulateStage& stage : report.stages) {
-    json["steps"].push_back(
-        {{"step", stage.name}, {"seconds", stage.seconds}, {"ns_per_pixel", stage.ns_per_pixel}});
-  }
-  for (const SimulateSwitch& one : report.switches) {
-    json["switches"].push_back({{"switch", one.name},
-                                {"ns_per_pixel", one.ns_per_pixel},
-                                {"times_plain", one.times_plain},
-                                {"mean_angular_error_deg", one.angular_error_deg.mean},
-                                {"p99_angular_error_deg", one.angular_error_deg.p99}});
-  }
-  return json.dump(2) + "\n";
-}
 
 }  // namespace
 
@@ -324,7 +303,7 @@ int RunBenchSimulate(const BenchSimulateArgs& args, const Task& task, std::ostre
     log << "sateen bench simulate: error: " << report.error().message << '\n';
     return ExitStatus(report.error());
   }
-  out << (args.json ? SimulateJson(*report) : SimulateText(*report));
+  out << (args.json ? JsonReport(*report) : TextReport(*report));
   return 0;
 }
 

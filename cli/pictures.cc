@@ -121,6 +121,14 @@ Rgb8 ShowHeat(const Image<float>& values, float top, const Image<uint8_t>& shown
   return heat;
 }
 
+Rgb8 ShowRelief(const Image<float>& height) {
+  const auto [lowest, highest] = std::ranges::minmax(height.pixels);
+  Image<float> above(height.Size());
+  std::ranges::transform(height.pixels, above.pixels.begin(),
+                         [low = lowest](float z) { return z - low; });
+  return ShowHeat(above, highest - lowest, Image<uint8_t>(height.Size(), 255));
+}
+
 Rgb8 Shrunk(const Rgb8& panel, int max_width) {
   const int factor = std::max(1, (panel[0].width + max_width - 1) / max_width);
   return {Shrink(panel[0], factor), Shrink(panel[1], factor), Shrink(panel[2], factor)};

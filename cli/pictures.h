@@ -23,6 +23,8 @@ using Rgb8 = std::array<Image<uint8_t>, 3>;
 // 0 is black, `top` and above are white, by way of purple, red and yellow; pixels where `shown` is
 // zero are grey.
 [[nodiscard]] Rgb8 ShowHeat(const Image<float>& values, float top, const Image<uint8_t>& shown);
+// Heights from the lowest, black, to the highest, white, in the colours of ShowHeat().
+[[nodiscard]] Rgb8 ShowRelief(const Image<float>& height);
 
 // Shrunk by a whole factor so that it is at most `max_width` wide.
 [[nodiscard]] Rgb8 Shrunk(const Rgb8& panel, int max_width);

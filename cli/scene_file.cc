@@ -94,7 +94,7 @@ Status ReadExposure(JsonReader reader, ExposureRecord& exposure) {
 }
 
 // The error of a value that a library refused, as one of this file's key.
-Status InFile(const Status& status, const std::filesystem::path& path, std::string_view key) {
+Status InFile(const Status& status, const std::filesystem::path& path, std::string_view key = "") {
   if (status || status.error().code != ErrorCode::kInvalidArgument) {
     return status;
   }
@@ -141,7 +141,7 @@ Result<SceneFile> ReadSceneFile(const std::filesystem::path& path) {
     }
   }
   if (status) {
-    status = InFile(ReadMaterials(materials, file.scene), path, "materials: specular.");
+    status = InFile(ReadMaterials(materials, file.scene), path);
   }
   if (status && illumination) {
     status = ReadIllumination(*illumination, file.scene.illumination);
@@ -166,7 +166,7 @@ Result<SceneFile> ReadSceneFile(const std::filesystem::path& path) {
     return tl::unexpected(rig.error());
   }
   file.scene.rig = std::move(*rig);
-  if (status = InFile(file.scene.Validate(), path, ""); !status) {
+  if (status = InFile(file.scene.Validate(), path); !status) {
     return tl::unexpected(status.error());
   }
   if (file.kind == SessionKind::kSheet) {

@@ -200,6 +200,10 @@ Status ReadMaterials(JsonReader reader, Scene& scene) {
     }
     JsonReader one = reader.Object(part);
     Result<Material> material = ReadMaterial(std::move(one));
+    if (!material && material.error().code == ErrorCode::kInvalidArgument) {  // of the BRDF
+      return Fail(ErrorCode::kInvalidArgument, "materials.{}.specular.{}", part,
+                  material.error().message);
+    }
     if (!material) {
       return tl::unexpected(material.error());
     }

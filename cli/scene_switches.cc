@@ -1,11 +1,14 @@
 #include "cli/scene_switches.h"
 
+#include <cmath>
 #include <memory>
+#include <numbers>
 #include <utility>
 
 #include "core/angle.h"
 #include "reflectance/specular.h"
 #include "simulation/rigs.h"
+#include "simulation/weave.h"
 
 namespace sateen::cli {
 namespace {
@@ -80,6 +83,15 @@ std::vector<SceneSwitch> SceneSwitches() {
          scene.lens.vignetting = {-0.5, 0.0, 0.0};
        }},
       {"psf_sigma_px 3", "psf", [](Scene& scene) { scene.lens.psf_sigma_px = 3.0; }},
+      {"texture waves", "texture-waves",
+       [](Scene& scene) {
+         scene.materials[0].albedo = WavyAlbedo{.min = 0.2, .max = 0.8, .period_mm = 80.0};
+       }},
+      {"texture patches", "texture-patches",
+       [](Scene& scene) {
+         scene.materials[0].albedo =
+             PatchesAlbedo{.values = {0.9, 0.6, 0.36, 0.2, 0.1, 0.03}, .patch_mm = 18.0};
+       }},
       {"samples 3, chessboard", "samples",
        [](Scene& scene) {
          scene.materials[0].albedo = ChessboardAlbedo{.columns = 10, .rows = 10, .square_mm = 10.0};
@@ -92,6 +104,60 @@ std::vector<SceneSwitch> SceneSwitches() {
        }},
       {"sensor D5100, 9 stops under", "noise", [](Scene&) {}, noisy},
   };
+}
+
+std::vector<SceneShape> SceneShapes() {
+  const auto weave = [](std::string_view pattern, double edge_deg, double amplitude_mm) {
+    const WeaveSpec spec{.pattern = *WeavePatternNamed(pattern),
+                         .pitch_mm = 1.6,
+                         .fill = 0.9,
+                         .edge_rad = edge_deg * kRadPerDeg,
+                         .amplitude_mm = amplitude_mm};
+    return SceneShape{pattern, 20.0, [spec] { return MakeWeave(spec); }};
+  };
+  return {
+      {"plane", 120.0, [] { return MakePlane(0.0, 0.0); }},
+      {"tilted-plane", 120.0, [] { return MakePlane(25.0 * kRadPerDeg, 0.6); }},
+      {"sphere", 120.0, [] { return MakeSphereCap(55.0, 60.0 * kRadPerDeg); }},
+      {"groove", 40.0, [] { return MakeGroove(8.0, 70.0 * kRadPerDeg); }},
+      {"steps", 40.0, [] { return MakeSteps(4, 7.0, 1.5, 1.0); }},
+      {"waves", 120.0, [] { return MakeWaves(kPeriodMm, kMaxSlopeRad); }},
+      {"height-map", 20.0,
+       [] {
+         Image<float> height(100, 100);  // a hundred bumps, as a file might hold them
+         for (int y = 0; y < height.height; ++y) {
+           for (int x = 0; x < height.width; ++x) {
+             const double bump =
+                 std::sin(0.1 * std::numbers::pi * x) * std::sin(0.1 * std::numbers::pi * y);
+             height.At(x, y) = static_cast<float>(0.4 * bump * bump * bump * bump);
+           }
+         }
+         return MakeHeightMap(std::move(height), 0.2);
+       }},
+      weave("plain", 45.0, 0.12),
+      weave("twill", 40.0, 0.12),
+      weave("satin", 35.0, 0.08),
+      weave("rib", 50.0, 0.2),
+      weave("knit", 50.0, 0.12),
+  };
+}
+
+Result<Scene> ShapeScene(const SceneShape& shape, ImageSize size) {
+  Result<SurfacePtr> surface = shape.make();
+  if (!surface) {
+    return tl::unexpected(surface.error());
+  }
+  Scene scene;
+  scene.rig = RingRig(size, LightModel::kNear, shape.width_mm);
+  scene.surface = std::move(*surface);
+  scene.illumination.shadows = Shadows::kCast;
+  for (const std::string_view part : scene.surface->Parts()) {
+    const Eigen::Vector3d rgb = part == "ground" ? Eigen::Vector3d(0.03, 0.03, 0.03)
+                                : part == "weft" ? Eigen::Vector3d(0.75, 0.7, 0.6)
+                                                 : Eigen::Vector3d(0.45, 0.5, 0.6);
+    scene.materials.push_back({.albedo = ConstantAlbedo{rgb}, .yarn_variation = 0.2});
+  }
+  return scene;
 }
 
 }  // namespace sateen::cli

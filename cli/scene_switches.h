@@ -26,4 +26,16 @@ struct SceneSwitch {
 // The first turns nothing on.
 [[nodiscard]] std::vector<SceneSwitch> SceneSwitches();
 
+// One of the surfaces that a scene may have, for its picture.
+struct SceneShape {
+  std::string_view file;  // stem of its picture: the value of surface.shape
+  double width_mm = 0.0;  // of the picture
+  std::function<Result<SurfacePtr>()> make;
+};
+
+[[nodiscard]] std::vector<SceneShape> SceneShapes();
+
+// The surface under ten near lights, each part in a colour of its own.
+[[nodiscard]] Result<Scene> ShapeScene(const SceneShape& shape, ImageSize size);
+
 }  // namespace sateen::cli

@@ -29,6 +29,11 @@ class SessionWriter {
 
   Status Write() {
     const Lights& lights = file_.scene.rig.lights;
+    if (std::ranges::find(lights, kDarkFrame, &Light::name) != lights.end()) {
+      return Fail(ErrorCode::kBadData,
+                  "a light of the rig is named '{}', as the dark frame is; rename the light",
+                  kDarkFrame);
+    }
     task_.BeginStage("geometry", file_.scene.rig.camera->size_px.height);
     Result<SceneRenderer> renderer = SceneRenderer::Create(file_.scene, task_);
     if (!renderer) {
@@ -115,14 +120,8 @@ class SessionWriter {
 
   // To look at: all frames, equally exposed, then normals, albedo and height.
   Status WriteOverview(const SurfaceMaps& maps) {
-    Image<float> height = maps.point_mm[2];
-    const auto [lowest, highest] = std::ranges::minmax(height.pixels);
-    for (float& z : height.pixels) {
-      z -= lowest;
-    }
-    const Image<uint8_t> everywhere(height.Size(), 255);
-    for (const Rgb8& panel : {ShowNormal(maps.normal), ShowLinear(maps.albedo, 1.0F),
-                              ShowHeat(height, highest - lowest, everywhere)}) {
+    for (const Rgb8& panel :
+         {ShowNormal(maps.normal), ShowLinear(maps.albedo, 1.0F), ShowRelief(maps.point_mm[2])}) {
       panels_.push_back(Shrunk(panel, kPanelPx));
     }
     return WritePng8(folder_.Stage("overview.png"), ContactSheet(panels_, kPanelColumns));

@@ -55,35 +55,35 @@ Status CheckAlbedo(const ConstantAlbedo& albedo) {
 
 Status CheckAlbedo(const WavyAlbedo& albedo) {
   if (!(albedo.min >= 0.0 && albedo.min <= albedo.max)) {
-    return BadValue("albedo.min", albedo.min, "0 <= min <= max");
+    return BadValue("texture.min", albedo.min, "0 <= min <= max");
   }
   if (!(albedo.max <= 1.0)) {
-    return BadValue("albedo.max", albedo.max, "max <= 1");
+    return BadValue("texture.max", albedo.max, "max <= 1");
   }
   return albedo.period_mm > 0.0 ? Status()
-                                : BadValue("albedo.period_mm", albedo.period_mm, "more than 0");
+                                : BadValue("texture.period_mm", albedo.period_mm, "more than 0");
 }
 
 Status CheckAlbedo(const ChessboardAlbedo& albedo) {
   if (std::min(albedo.columns, albedo.rows) < 2) {
-    return BadValue("albedo.columns, rows", std::min(albedo.columns, albedo.rows), "2 or more");
+    return BadValue("texture.columns, rows", std::min(albedo.columns, albedo.rows), "2 or more");
   }
   if (!(albedo.square_mm > 0.0)) {
-    return BadValue("albedo.square_mm", albedo.square_mm, "more than 0");
+    return BadValue("texture.square_mm", albedo.square_mm, "more than 0");
   }
   if (!IsFraction(albedo.dark)) {
-    return BadValue("albedo.dark", albedo.dark, "0 to 1");
+    return BadValue("texture.dark", albedo.dark, "0 to 1");
   }
-  return IsFraction(albedo.light) ? Status() : BadValue("albedo.light", albedo.light, "0 to 1");
+  return IsFraction(albedo.light) ? Status() : BadValue("texture.light", albedo.light, "0 to 1");
 }
 
 Status CheckAlbedo(const PatchesAlbedo& albedo) {
   if (!(albedo.patch_mm > 0.0)) {
-    return BadValue("albedo.patch_mm", albedo.patch_mm, "more than 0");
+    return BadValue("texture.patch_mm", albedo.patch_mm, "more than 0");
   }
   for (const double value : albedo.values) {
     if (!IsFraction(value)) {
-      return BadValue("albedo.patches", value, "0 to 1 each");
+      return BadValue("texture.values", value, "0 to 1 each");
     }
   }
   return {};
@@ -150,22 +150,35 @@ Status CheckPlaces(const Rig& rig, const Surface& surface) {
   return status;
 }
 
-Status CheckLightNames(const Scene& scene) {
-  std::vector<std::string> asked = scene.illumination.dead;
-  if (!scene.lens.bump_from.empty()) {
-    asked.push_back(scene.lens.bump_from);
+Status CheckLightName(const Lights& lights, std::string_view key, const std::string& name) {
+  if (std::ranges::find(lights, name, &Light::name) != lights.end()) {
+    return {};
   }
-  for (const std::string& name : asked) {
-    if (std::ranges::find(scene.rig.lights, name, &Light::name) == scene.rig.lights.end()) {
-      std::vector<std::string> names;
-      for (const Light& light : scene.rig.lights) {
-        names.push_back(light.name);
-      }
-      return Fail(ErrorCode::kInvalidArgument, "light '{}' is not in the rig; need one of {}", name,
-                  fmt::join(names, ", "));
+  std::vector<std::string> names;
+  names.reserve(lights.size());
+  for (const Light& light : lights) {
+    names.push_back(light.name);
+  }
+  return Fail(ErrorCode::kInvalidArgument, "{}: '{}' is no light of the rig; need one of {}", key,
+              name, fmt::join(names, ", "));
+}
+
+Status CheckLightNames(const Scene& scene) {
+  for (const std::string& name : scene.illumination.dead) {
+    if (Status status = CheckLightName(scene.rig.lights, "illumination.dead", name); !status) {
+      return status;
     }
   }
-  return {};
+  return scene.lens.bump_from.empty()
+             ? Status()
+             : CheckLightName(scene.rig.lights, "lens.bump.from", scene.lens.bump_from);
+}
+
+Status CheckMaterial(const Material& material) {
+  if (!(material.yarn_variation >= 0.0 && material.yarn_variation < 1.0)) {
+    return BadValue("yarn_variation", material.yarn_variation, "0 to below 1");
+  }
+  return std::visit([](const auto& kind) { return CheckAlbedo(kind); }, material.albedo);
 }
 
 }  // namespace
@@ -182,13 +195,10 @@ Status Scene::Validate() const {
   if (!rig.camera) {
     return Fail(ErrorCode::kInvalidArgument, "the rig has no camera; need one, for the frames");
   }
-  for (const Material& material : materials) {
-    Status status = std::visit([](const auto& kind) { return CheckAlbedo(kind); }, material.albedo);
-    if (status && !(material.yarn_variation >= 0.0 && material.yarn_variation < 1.0)) {
-      status = BadValue("yarn_variation", material.yarn_variation, "0 to below 1");
-    }
-    if (!status) {
-      return status;
+  const std::vector<std::string_view> parts = surface->Parts();
+  for (size_t i = 0; i < parts.size(); ++i) {
+    if (const Status status = CheckMaterial(materials[i]); !status) {
+      return Fail(status.error().code, "materials.{}.{}", parts[i], status.error().message);
     }
   }
   return CheckIllumination(illumination)

@@ -252,11 +252,11 @@ TEST(Scene, ErrorsNameTheKeyAndItsRange) {
   EXPECT_THAT(message([](Scene& s) {
                 s.materials[0].albedo = ConstantAlbedo{{0.5, -0.1, 0.5}};
               }),
-              HasSubstr("albedo = -0.1; need 0 to 1"));
+              HasSubstr("materials.surface.albedo = -0.1; need 0 to 1"));
   EXPECT_THAT(message([](Scene& s) { s.illumination.flicker = 0.5; }),
               HasSubstr("illumination.flicker = 0.5; need 0 to 0.2"));
   EXPECT_THAT(message([](Scene& s) { s.illumination.dead = {"led-77"}; }),
-              HasSubstr("light 'led-77' is not in the rig"));
+              HasSubstr("'led-77' is no light of the rig; need one of led-0, "));
   EXPECT_THAT(message([](Scene& s) { s.lens.psf_sigma_px = -1; }), HasSubstr("lens.psf_sigma_px"));
   EXPECT_THAT(message([](Scene& s) {
                 s.lens.vignetting = {-1.5, 0, 0};
