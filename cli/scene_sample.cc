@@ -100,9 +100,8 @@ Result<SurfacePtr> ReadSurface(JsonReader& reader, const std::filesystem::path& 
 
 namespace {
 
-Result<Albedo> ReadTexture(JsonReader reader) {
+Status ReadTexture(JsonReader reader, Albedo& albedo) {
   const std::string kind = reader.String("kind");
-  Albedo albedo;
   if (kind == "waves") {
     albedo = WavyAlbedo{.min = reader.Number("min"),
                         .max = reader.Number("max"),
@@ -121,10 +120,7 @@ Result<Albedo> ReadTexture(JsonReader reader) {
   } else {
     reader.Require(false, "kind", fmt::format("'{}'; need waves, chessboard or patches", kind));
   }
-  if (Status status = reader.Finish(); !status) {
-    return tl::unexpected(status.error());
-  }
-  return albedo;
+  return reader.Finish();
 }
 
 // A BRDF after it was checked, or the error with the key.
@@ -174,10 +170,8 @@ Result<Material> ReadMaterial(JsonReader reader) {
   }
   if (rgb) {
     material.albedo = ConstantAlbedo{Eigen::Vector3d(rgb->data())};
-  } else if (Result<Albedo> albedo = ReadTexture(std::move(*texture)); albedo) {
-    material.albedo = std::move(*albedo);
-  } else {
-    return tl::unexpected(albedo.error());
+  } else if (Status status = ReadTexture(std::move(*texture), material.albedo); !status) {
+    return tl::unexpected(status.error());
   }
   if (specular) {
     Result<std::shared_ptr<const Brdf>> brdf = ReadSpecular(std::move(*specular));
@@ -194,8 +188,8 @@ Result<Material> ReadMaterial(JsonReader reader) {
 Status ReadMaterials(JsonReader reader, Scene& scene) {
   for (const std::string_view part : scene.surface->Parts()) {
     if (part == "ground" && !reader.Has(part)) {
-      scene.materials.push_back(
-          {.albedo = ConstantAlbedo{Eigen::Vector3d::Constant(kGroundAlbedo)}});
+      scene.materials.emplace_back().albedo =
+          ConstantAlbedo{Eigen::Vector3d::Constant(kGroundAlbedo)};
       continue;
     }
     JsonReader one = reader.Object(part);

@@ -155,7 +155,9 @@ Result<Scene> ShapeScene(const SceneShape& shape, ImageSize size) {
     const Eigen::Vector3d rgb = part == "ground" ? Eigen::Vector3d(0.03, 0.03, 0.03)
                                 : part == "weft" ? Eigen::Vector3d(0.75, 0.7, 0.6)
                                                  : Eigen::Vector3d(0.45, 0.5, 0.6);
-    scene.materials.push_back({.albedo = ConstantAlbedo{rgb}, .yarn_variation = 0.2});
+    Material& material = scene.materials.emplace_back();
+    material.albedo = ConstantAlbedo{rgb};
+    material.yarn_variation = 0.2;
   }
   return scene;
 }
