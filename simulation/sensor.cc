@@ -44,8 +44,8 @@ std::optional<Sensor> SensorNamed(std::string_view name) {
     return Sensor{.bits = 14,
                   .black_dn = 0.0,
                   .white_dn = 15892.0,
-                  .full_well_electrons = 42000.0,
-                  .read_noise_electrons = 3.0};
+                  .full_well_electrons = 47000.0,
+                  .read_noise_electrons = 4.9};
   }
   return std::nullopt;
 }
