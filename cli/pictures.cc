@@ -134,6 +134,19 @@ Rgb8 Shrunk(const Rgb8& panel, int max_width) {
   return {Shrink(panel[0], factor), Shrink(panel[1], factor), Shrink(panel[2], factor)};
 }
 
+Rgb8 Enlarged(const Rgb8& panel, int factor) {
+  const int by = std::max(1, factor);
+  Rgb8 large = MakeRgb8({panel[0].width * by, panel[0].height * by});
+  for (size_t c = 0; c < 3; ++c) {
+    for (int y = 0; y < large[c].height; ++y) {
+      for (int x = 0; x < large[c].width; ++x) {
+        large[c].At(x, y) = panel[c].At(x / by, y / by);
+      }
+    }
+  }
+  return large;
+}
+
 Rgb8 ContactSheet(const std::vector<Rgb8>& panels, int columns) {
   SATEEN_CHECK(!panels.empty());
   const ImageSize size = panels[0][0].Size();

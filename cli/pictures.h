@@ -28,6 +28,8 @@ using Rgb8 = std::array<Image<uint8_t>, 3>;
 
 // Shrunk by a whole factor so that it is at most `max_width` wide.
 [[nodiscard]] Rgb8 Shrunk(const Rgb8& panel, int max_width);
+// Each pixel as a square of `factor` x `factor`.
+[[nodiscard]] Rgb8 Enlarged(const Rgb8& panel, int factor);
 // Panels of one size in rows of `columns`.
 [[nodiscard]] Rgb8 ContactSheet(const std::vector<Rgb8>& panels, int columns);
 // The panels, shrunk to at most `max_width` each, in a row.

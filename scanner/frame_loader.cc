@@ -32,17 +32,6 @@ Result<Photo> ReadPhotoOrRaw(const FrameFile& file, Encoding encoding) {
   });
 }
 
-Result<std::string> CheckedHash(const FrameFile& file) {
-  Result<std::string> hash = Sha256OfFile(file.path);
-  if (hash && file.sha256 && *file.sha256 != *hash) {
-    return Fail(ErrorCode::kBadData,
-                "{}: its SHA-256 is {} but the session recorded {}: the file has changed since the "
-                "capture; restore it or capture again",
-                file.path.string(), *hash, *file.sha256);
-  }
-  return hash;
-}
-
 // Equation (1) without the dark frames.
 Result<LoadedFrame> LoadFrame(const FrameFile& file, Encoding encoding) {
   Result<std::string> hash = CheckedHash(file);
@@ -126,6 +115,17 @@ Status Collect(std::vector<Result<LoadedFrame>>& frames, LoadedFrames& result) {
 }
 
 }  // namespace
+
+Result<std::string> CheckedHash(const FrameFile& file) {
+  Result<std::string> hash = Sha256OfFile(file.path);
+  if (hash && file.sha256 && *file.sha256 != *hash) {
+    return Fail(ErrorCode::kBadData,
+                "{}: its SHA-256 is {} but the session recorded {}: the file has changed since the "
+                "capture; restore it or capture again",
+                file.path.string(), *hash, *file.sha256);
+  }
+  return hash;
+}
 
 Status CheckSize(const std::string& what, ImageSize size, ImageSize frame_size) {
   if (size == frame_size) {

@@ -1,0 +1,142 @@
+#include "scanner/block_means.h"
+
+#include <array>
+#include <limits>
+
+#include "imaging/image_io.h"
+#include "imaging/raw.h"
+#include "scanner/frame_loader.h"
+
+namespace sateen {
+namespace {
+
+constexpr float kSaturationLevel = 0.98F;  // of the white level
+constexpr int kFewestSites = 4;            // along each side of a block
+
+// What one block adds up, for each colour.
+struct BlockSums {
+  std::array<double, 3> value = {};
+  std::array<double, 3> difference2 = {};  // of horizontal neighbours of one colour, squared
+  std::array<double, 3> count = {};
+  std::array<double, 3> pairs = {};
+  bool saturated = false;
+
+  void Add(size_t colour, float value_here, float saturation) {
+    value[colour] += static_cast<double>(value_here);
+    count[colour] += 1.0;
+    saturated = saturated || value_here >= saturation;
+  }
+  void AddPair(size_t colour, float left, float right) {
+    const double difference = static_cast<double>(right) - static_cast<double>(left);
+    difference2[colour] += difference * difference;
+    pairs[colour] += 1.0;
+  }
+  [[nodiscard]] BlockMean Mean(double exposure) const {
+    BlockMean mean{.saturated = saturated};
+    for (size_t c = 0; c < 3; ++c) {
+      const auto i = static_cast<Eigen::Index>(c);
+      mean.radiance_rgb[i] = value[c] / count[c] / exposure;
+      mean.site_variance_rgb[i] = 0.5 * difference2[c] / pairs[c] / (exposure * exposure);
+      mean.sites_rgb[i] = count[c];
+    }
+    return mean;
+  }
+};
+
+// Rows or columns of a block.
+struct Span {
+  int begin;
+  int end;
+};
+
+Span SpanOf(int block, int blocks, int sites) {
+  return {static_cast<int>(static_cast<int64_t>(block) * sites / blocks),
+          static_cast<int>(static_cast<int64_t>(block + 1) * sites / blocks)};
+}
+
+BlockMean MeanOfMosaic(const RawMosaic& mosaic, Span columns, Span rows, double exposure) {
+  BlockSums sums;
+  for (int y = rows.begin; y < rows.end; ++y) {
+    for (int x = columns.begin; x < columns.end; ++x) {
+      const size_t colour = mosaic.cfa[static_cast<size_t>(y % 2 * 2 + x % 2)];
+      const float value = mosaic.samples.At(x, y);
+      sums.Add(colour, value, kSaturationLevel);
+      if (x + 2 < columns.end) {
+        sums.AddPair(colour, value, mosaic.samples.At(x + 2, y));
+      }
+    }
+  }
+  return sums.Mean(exposure);
+}
+
+BlockMean MeanOfPhoto(const Photo& photo, Span columns, Span rows, double exposure) {
+  const float saturation = photo.saturation ? kSaturationLevel * *photo.saturation
+                                            : std::numeric_limits<float>::infinity();
+  BlockSums sums;
+  for (size_t c = 0; c < 3; ++c) {
+    for (int y = rows.begin; y < rows.end; ++y) {
+      for (int x = columns.begin; x < columns.end; ++x) {
+        const float value = photo.rgb[c].At(x, y);
+        sums.Add(c, value, saturation);
+        if (x + 1 < columns.end) {
+          sums.AddPair(c, value, photo.rgb[c].At(x + 1, y));
+        }
+      }
+    }
+  }
+  return sums.Mean(exposure);
+}
+
+template <typename MeanOf>
+Result<BlockMeans> Divide(const FrameFile& file, ImageSize size_px, const BlockGrid& grid,
+                          const MeanOf& mean_of) {
+  if (size_px.width < kFewestSites * grid.columns || size_px.height < kFewestSites * grid.rows) {
+    return Fail(ErrorCode::kBadData, "{}: is {} x {} px; need at least {} x {} for {} x {} blocks",
+                file.path.string(), size_px.width, size_px.height, kFewestSites * grid.columns,
+                kFewestSites * grid.rows, grid.columns, grid.rows);
+  }
+  BlockMeans means{.size_px = size_px, .grid = grid};
+  means.blocks.reserve(static_cast<size_t>(grid.columns) * static_cast<size_t>(grid.rows));
+  for (int row = 0; row < grid.rows; ++row) {
+    for (int column = 0; column < grid.columns; ++column) {
+      means.blocks.push_back(mean_of(SpanOf(column, grid.columns, size_px.width),
+                                     SpanOf(row, grid.rows, size_px.height)));
+    }
+  }
+  return means;
+}
+
+}  // namespace
+
+Eigen::Vector2d BlockMeans::Center(int column, int row) const {
+  const Span x = SpanOf(column, grid.columns, size_px.width);
+  const Span y = SpanOf(row, grid.rows, size_px.height);
+  return {0.5 * (x.begin + x.end - 1), 0.5 * (y.begin + y.end - 1)};
+}
+
+Result<BlockMeans> ReadBlockMeans(const FrameFile& file, const BlockGrid& grid) {
+  Result<std::string> hash = CheckedHash(file);
+  if (!hash) {
+    return tl::unexpected(hash.error());
+  }
+  Result<BlockMeans> means = BlockMeans();
+  if (IsRawName(file.path)) {
+    means = ReadRawMosaic(file.path).and_then([&](const RawMosaic& mosaic) {
+      return Divide(file, mosaic.samples.Size(), grid, [&](Span columns, Span rows) {
+        return MeanOfMosaic(mosaic, columns, rows, file.exposure);
+      });
+    });
+  } else {
+    means = ReadPhoto(file.path, Encoding::kAuto).and_then([&](const Photo& photo) {
+      return Divide(file, photo.rgb.Size(), grid, [&](Span columns, Span rows) {
+        return MeanOfPhoto(photo, columns, rows, file.exposure);
+      });
+    });
+  }
+  if (means) {
+    means->sha256 = *std::move(hash);
+  }
+  return means;
+}
+
+}  // namespace sateen

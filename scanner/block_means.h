@@ -1,0 +1,43 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "core/error.h"
+#include "scanner/capture_plan.h"
+
+namespace sateen {
+
+// How a frame is divided: into columns x rows of blocks of about one size.
+struct BlockGrid {
+  int columns = 96;
+  int rows = 64;
+};
+
+struct BlockMean {
+  Eigen::Vector3d radiance_rgb = Eigen::Vector3d::Zero();
+  // Of one site, from how neighbours of one colour differ: a slope across the block is no noise.
+  Eigen::Vector3d site_variance_rgb = Eigen::Vector3d::Zero();
+  Eigen::Vector3d sites_rgb = Eigen::Vector3d::Zero();  // how many sites of each colour
+  bool saturated = false;  // a site at or above 98 % of the white level
+};
+
+// A frame as the means of its blocks, rows from the top: what a fit of smooth light needs of it.
+struct BlockMeans {
+  ImageSize size_px;  // of the frame
+  BlockGrid grid;
+  std::vector<BlockMean> blocks;
+  std::string sha256;
+
+  // The middle of a block. [px]
+  [[nodiscard]] Eigen::Vector2d Center(int column, int row) const;
+};
+
+/// Reads a frame of a session: camera RAW straight from the mosaic, each colour from its own sites, or
+/// a linear image.
+///
+/// Errors   kIo, kBadData as ReadRawMosaic() and ReadPhoto(); the hash differs from the recorded one;
+///          the frame has fewer than 4 x 4 sites a block
+[[nodiscard]] Result<BlockMeans> ReadBlockMeans(const FrameFile& file, const BlockGrid& grid);
+
+}  // namespace sateen

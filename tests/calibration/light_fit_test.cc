@@ -1,0 +1,168 @@
+#include "calibration/light_fit.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <numbers>
+
+#include "simulation/rigs.h"
+#include "tests/calibration/synthetic_sheets.h"
+
+namespace sateen {
+namespace {
+
+using sateen::testing::SamplesOf;
+using sateen::testing::SyntheticCamera;
+using ::testing::HasSubstr;
+
+// The camera of the scanner of The Order: 1886 above the table.
+SyntheticCamera FullCamera() { return {.camera = OverheadCamera({4928, 3264}, 610.0, 300.0)}; }
+
+// A light of the ring, and where a ruler might say that it is.
+Light TrueLight(LightModel model, double anisotropy = 0.0) {
+  Light light = LedRing(model, 10, 45.0 * kRadPerDeg, 600.0)[3];
+  light.flux_rgb = {0.40, 0.36, 0.30};
+  light.anisotropy = anisotropy;
+  return light;
+}
+
+Light RoughLight(const Light& light, double off_mm, uint64_t seed) {
+  Light rough = light;
+  rough.model = LightModel::kNear;
+  const Eigen::Vector3d away(NormalDeviate(seed, 0), NormalDeviate(seed, 1),
+                             NormalDeviate(seed, 2));
+  rough.position_mm += off_mm * away.normalized();
+  rough.flux_rgb.setOnes();
+  return rough;
+}
+
+double WorstDirectionDeg(const Light& a, const Light& b, const std::vector<SheetSample>& samples) {
+  double worst = 0.0;
+  for (const SheetSample& sample : samples) {
+    const Eigen::Vector3d la = IncidentAt(a, sample.point_mm).l;
+    const Eigen::Vector3d lb = IncidentAt(b, sample.point_mm).l;
+    worst = std::max(worst, std::atan2(la.cross(lb).norm(), la.dot(lb)));
+  }
+  return worst / kRadPerDeg;
+}
+
+double WorstFlux(const Light& a, const Light& b) {
+  return (a.flux_rgb.cwiseQuotient(b.flux_rgb) - Eigen::Vector3d::Ones()).cwiseAbs().maxCoeff();
+}
+
+TEST(FitLight, OneFlatSheetGivesDirections) {
+  const Light truth = TrueLight(LightModel::kNear);
+  const std::vector<SheetSample> samples = SamplesOf(FullCamera(), truth, 1, 7);
+
+  const LightFit fit = FitLight(samples, RoughLight(truth, 15.0, 8)).value();
+
+  EXPECT_EQ(fit.light.model, LightModel::kNear);
+  EXPECT_LT(WorstDirectionDeg(fit.light, truth, samples), 0.25);  // measured 0.005
+  EXPECT_EQ(fit.light.name, truth.name);
+}
+
+TEST(FitLight, AFlatSheetAndFourTiltsGivePositionAndFlux) {
+  for (const double anisotropy : {0.0, 1.5}) {
+    const LightModel model = anisotropy > 0.0 ? LightModel::kLed : LightModel::kNear;
+    const Light truth = TrueLight(model, anisotropy);
+    const std::vector<SheetSample> samples = SamplesOf(FullCamera(), truth, 5, 9);
+
+    const LightFit fit = FitLight(samples, RoughLight(truth, 15.0, 10)).value();
+
+    EXPECT_EQ(fit.light.model, model);  // no higher rung than the light has
+    EXPECT_LT((fit.light.position_mm - truth.position_mm).norm(), 0.1);
+    EXPECT_LT(WorstDirectionDeg(fit.light, truth, samples), 0.01);
+    EXPECT_LT(WorstFlux(fit.light, truth), 1e-3);
+    if (model == LightModel::kLed) {
+      EXPECT_NEAR(fit.light.anisotropy, 1.5, 0.01);
+      EXPECT_LT((fit.light.axis - truth.axis).norm(), 0.01);
+    }
+  }
+}
+
+TEST(FitLight, AnLedSeenAsAPointIsNotBelieved) {
+  const Light truth = TrueLight(LightModel::kLed, 3.0);
+  const std::vector<SheetSample> samples = SamplesOf(FullCamera(), truth, 5, 11);
+
+  const LightFit point =
+      FitLight(samples, RoughLight(truth, 5.0, 12), {.highest_rung = LightModel::kNear}).value();
+
+  EXPECT_GT(point.rungs[0].held_out_rms, 5.0 * point.noise_rms);
+  const LightFit led = FitLight(samples, RoughLight(truth, 5.0, 12)).value();
+  ASSERT_EQ(led.rungs.size(), 2U);
+  EXPECT_LT(led.rungs[1].held_out_rms, 1.1 * led.noise_rms);
+}
+
+// Over a hundred rigs: are the standard deviations those of the errors?
+TEST(FitLight, PredictsItsErrors) {
+  SyntheticCamera small = FullCamera();
+  small.columns = 32;
+  small.rows = 21;
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();
+  Eigen::Vector3d flux = Eigen::Vector3d::Zero();
+  constexpr int kRigs = 100;
+  for (uint64_t rig = 0; rig < kRigs; ++rig) {
+    Light truth = LedRing(LightModel::kNear, kRigs,
+                          (30.0 + 0.3 * static_cast<double>(rig)) * kRadPerDeg, 600.0)[rig];
+    truth.flux_rgb = {0.4, 0.36, 0.3};
+    const std::vector<SheetSample> samples = SamplesOf(small, truth, 5, 100 + rig);
+    const LightFit fit = FitLight(samples, RoughLight(truth, 15.0, 300 + rig)).value();
+    const Eigen::Vector3d off =
+        (fit.light.position_mm - truth.position_mm).cwiseQuotient(fit.position_sd_mm);
+    const Eigen::Vector3d off_flux =
+        (fit.light.flux_rgb.cwiseQuotient(truth.flux_rgb) - Eigen::Vector3d::Ones())
+            .cwiseQuotient(fit.flux_sd);
+    position += off.cwiseAbs2() / kRigs;
+    flux += off_flux.cwiseAbs2() / kRigs;
+  }
+  for (Eigen::Index c = 0; c < 3; ++c) {
+    EXPECT_NEAR(std::sqrt(position[c]), 1.05, 0.35) << c;
+    EXPECT_NEAR(std::sqrt(flux[c]), 1.05, 0.35) << c;
+  }
+}
+
+TEST(FitLight, DustAndAFoldAreLeftOut) {
+  const Light truth = TrueLight(LightModel::kNear);
+  std::vector<SheetSample> samples = SamplesOf(FullCamera(), truth, 5, 13);
+  for (size_t i = 0; i < samples.size(); i += 50) {
+    samples[i].radiance_rgb *= 0.7;  // dust
+  }
+  for (size_t i = 20 * 64; i < 23 * 64; ++i) {
+    samples[i].radiance_rgb *= 1.06;  // a fold across the flat sheet
+  }
+
+  const LightFit fit = FitLight(samples, RoughLight(truth, 15.0, 14)).value();
+
+  EXPECT_LT((fit.light.position_mm - truth.position_mm).norm(), 0.1);
+  EXPECT_GT(fit.left_out, samples.size() / 50);
+  EXPECT_LT(fit.left_out, samples.size() / 20);
+}
+
+TEST(FitLight, PaperOfAnotherWhitenessChangesTheFluxAlone) {
+  const Light truth = TrueLight(LightModel::kNear);
+  const std::vector<SheetSample> samples = SamplesOf(FullCamera(), truth, 5, 15);
+
+  const LightFit fit = FitLight(samples, RoughLight(truth, 5.0, 16), {.albedo = 0.9}).value();
+
+  EXPECT_NEAR(fit.light.flux_rgb[0], truth.flux_rgb[0] * 0.99 / 0.9, 1e-3);
+  EXPECT_LT((fit.light.position_mm - truth.position_mm).norm(), 0.1);
+}
+
+TEST(FitLight, ErrorsSayWhatToDo) {
+  const Light truth = TrueLight(LightModel::kNear);
+  std::vector<SheetSample> samples = SamplesOf(FullCamera(), truth, 1, 17);
+  Light distant = truth;
+  distant.model = LightModel::kDistant;
+  EXPECT_THAT(FitLight(samples, distant).error().message, HasSubstr("need its position_mm"));
+  EXPECT_THAT(FitLight(samples, truth, {.albedo = 1.2}).error().message,
+              HasSubstr("albedo = 1.2; need 0 < albedo <= 1"));
+  EXPECT_THAT(FitLight({samples.begin(), samples.begin() + 40}, truth).error().message,
+              HasSubstr("40 samples of the sheet; need at least 50"));
+  for (SheetSample& sample : samples) {
+    sample.radiance_rgb.setZero();
+  }
+  EXPECT_THAT(FitLight(samples, truth).error().message, HasSubstr("never lit"));
+}
+
+}  // namespace
+}  // namespace sateen
