@@ -54,9 +54,9 @@ struct BoardSpec {
 // Corners of one board in one picture.
 struct BoardView {
   ImageSize size_px;
-  std::vector<int> ids;
-  std::vector<Eigen::Vector2d> corners_px;  // pixel centres at integers
-  std::vector<Eigen::Vector3d> points_mm;   // the same corners in the board frame; z = 0
+  std::vector<int> ids = {};
+  std::vector<Eigen::Vector2d> corners_px = {};  // pixel centres at integers
+  std::vector<Eigen::Vector3d> points_mm = {};   // the same corners in the board frame; z = 0
   std::string name = {};                    // of the picture, for messages; may be empty
 };
 

@@ -19,12 +19,10 @@ Status ReadIllumination(JsonReader reader, Illumination& illumination) {
                    fmt::format("'{}'; need none, attached or cast", *shadows));
     illumination.shadows = static_cast<Shadows>(found - kNames.begin());
   }
-  if (reader.Has("shadow_samples")) {
-    illumination.shadow_samples = reader.Integer("shadow_samples");
-  }
-  if (reader.Has("bounce_rays")) {
-    illumination.bounce_rays = reader.Integer("bounce_rays");
-  }
+  illumination.shadow_samples =
+      reader.OptionalInteger("shadow_samples").value_or(illumination.shadow_samples);
+  illumination.bounce_rays =
+      reader.OptionalInteger("bounce_rays").value_or(illumination.bounce_rays);
   if (const auto ambient = reader.OptionalNumbers("ambient_rgb", 3)) {
     illumination.ambient_rgb = Eigen::Vector3d(ambient->data());
   }
@@ -40,9 +38,7 @@ Status ReadLens(JsonReader reader, Lens& lens) {
     lens.vignetting = {(*vignetting)[0], (*vignetting)[1], (*vignetting)[2]};
   }
   lens.psf_sigma_px = reader.OptionalNumber("psf_sigma_px").value_or(0.0);
-  if (reader.Has("samples")) {
-    lens.samples = reader.Integer("samples");
-  }
+  lens.samples = reader.OptionalInteger("samples").value_or(lens.samples);
   if (std::optional<JsonReader> bump = reader.OptionalObject("bump")) {
     lens.bump_from = bump->String("from");
     const std::vector<double> shift = bump->Numbers("shift_px", 2);
@@ -60,8 +56,8 @@ Status ReadSensor(JsonReader reader, Sensor& sensor) {
     reader.Require(named.has_value(), "preset", fmt::format("'{}'; need nikon-d5100", *preset));
     sensor = named.value_or(Sensor());
   }
-  if (reader.Has("bits")) {
-    sensor.bits = reader.Integer("bits");
+  if (const auto bits = reader.OptionalInteger("bits")) {
+    sensor.bits = *bits;
     sensor.white_dn = std::exp2(sensor.bits) - 1.0;
   }
   sensor.black_dn = reader.OptionalNumber("black").value_or(sensor.black_dn);
@@ -112,6 +108,7 @@ Result<SceneFile> ReadSceneFile(const std::filesystem::path& path) {
   JsonReader top(*json, path.string());
   file.title = top.OptionalString("title").value_or("");
   const std::string rig_file = top.String("rig");
+  file.inputs = {path, path.parent_path() / rig_file};
   const std::string kind = top.OptionalString("kind").value_or("fabric");
   constexpr std::array kKinds = {SessionKind::kFabric, SessionKind::kSheet, SessionKind::kChart,
                                  SessionKind::kBoard};
@@ -120,10 +117,9 @@ Result<SceneFile> ReadSceneFile(const std::filesystem::path& path) {
   top.Require(known_kind != kKinds.end(), "kind",
               fmt::format("'{}'; need fabric, sheet, chart or board", kind));
   file.kind = known_kind != kKinds.end() ? *known_kind : SessionKind::kFabric;
-  if (top.Has("seed")) {
-    const int seed = top.Integer("seed");
-    top.Require(seed >= 0, "seed", fmt::format("{}; need 0 or more", seed));
-    file.scene.seed = static_cast<uint64_t>(std::max(seed, 0));
+  if (const auto seed = top.OptionalInteger("seed")) {
+    top.Require(*seed >= 0, "seed", fmt::format("{}; need 0 or more", *seed));
+    file.scene.seed = static_cast<uint64_t>(std::max(*seed, 0));
   }
   JsonReader surface = top.Object("surface");
   JsonReader materials = top.Object("materials");
@@ -163,7 +159,7 @@ Result<SceneFile> ReadSceneFile(const std::filesystem::path& path) {
   }
   Result<Rig> rig = ReadRig(path.parent_path() / rig_file);
   if (!rig) {
-    return tl::unexpected(rig.error());
+    return Fail(rig.error().code, "{}: rig: {}", path.string(), rig.error().message);
   }
   file.scene.rig = std::move(*rig);
   if (status = InFile(file.scene.Validate(), path); !status) {

@@ -4,6 +4,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "core/error.h"
 #include "scanner/session.h"
@@ -25,6 +26,7 @@ struct SceneFile {
   Scene scene;
   Sensor sensor;
   ExposureRecord exposure;
+  std::vector<std::filesystem::path> inputs;          // the scene file and the rig
   std::optional<Eigen::Isometry3d> table_from_sheet;  // of a sheet: the plane that was rendered
 };
 

@@ -30,7 +30,7 @@ Result<SurfacePtr> ReadHeightMap(JsonReader& reader, const std::filesystem::path
   }
   Result<Photo> photo = ReadPhoto(folder / file, Encoding::kLinear);
   if (!photo) {
-    return tl::unexpected(photo.error());
+    return Fail(photo.error().code, "surface.file: {}", photo.error().message);
   }
   Image<float>& height = photo->rgb[0];
   for (float& z : height.pixels) {
@@ -161,8 +161,8 @@ Result<Material> ReadMaterial(JsonReader reader) {
   Material material;
   const std::optional<std::vector<double>> rgb = reader.OptionalNumbers("albedo", 3);
   std::optional<JsonReader> texture = reader.OptionalObject("texture");
-  reader.Require(rgb.has_value() != texture.has_value(), "albedo",
-                 "given together with texture, or neither; need one of them");
+  reader.Require(rgb || texture, "albedo", "is missing, and so is texture; need one of them");
+  reader.Require(!rgb || !texture, "albedo", "stands beside texture; need one of them alone");
   material.yarn_variation = reader.OptionalNumber("yarn_variation").value_or(0.0);
   std::optional<JsonReader> specular = reader.OptionalObject("specular");
   if (Status status = reader.Finish(); !status) {

@@ -47,6 +47,15 @@ Result<SceneFile> Simulate(const SimulateArgs& args, const Task& task) {
   if (!file) {
     return file;
   }
+  for (const fs::path& input : file->inputs) {
+    std::error_code ignored;  // a folder that does not exist yet holds no input
+    if (fs::equivalent(fs::absolute(input).parent_path(), args.output, ignored)) {
+      return Fail(ErrorCode::kInvalidArgument,
+                  "{}: holds {}, which the scene is made of and the session could replace; give a "
+                  "folder of its own for the session",
+                  args.output.string(), input.filename().string());
+    }
+  }
   Result<OutputFolder> folder = OutputFolder::Open(args.output);
   if (!folder) {
     return tl::unexpected(folder.error());

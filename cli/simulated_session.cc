@@ -16,6 +16,7 @@ namespace {
 
 constexpr const char* kDarkFrame = "dark";
 constexpr int kPanelPx = 240;  // width in the overview
+constexpr int kSmallestRawPx = 22;
 constexpr int kPanelColumns = 5;
 constexpr uint64_t kSensorStream = 1000;  // one stream of noise a frame from here on
 
@@ -33,6 +34,13 @@ class SessionWriter {
       return Fail(ErrorCode::kBadData,
                   "a light of the rig is named '{}', as the dark frame is; rename the light",
                   kDarkFrame);
+    }
+    const ImageSize size = file_.scene.rig.camera->size_px;
+    if (format_ == FrameFormat::kRawDng && std::min(size.width, size.height) < kSmallestRawPx) {
+      return Fail(ErrorCode::kBadData,
+                  "the rig's camera.size_px is [{}, {}]; RAW files need at least {} each: LibRaw "
+                  "reads no smaller ones; use --linear",
+                  size.width, size.height, kSmallestRawPx);
     }
     task_.BeginStage("geometry", file_.scene.rig.camera->size_px.height);
     Result<SceneRenderer> renderer = SceneRenderer::Create(file_.scene, task_);

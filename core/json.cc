@@ -63,17 +63,24 @@ std::optional<double> JsonReader::FindNumber(std::string_view key, bool required
   return value == nullptr ? std::nullopt : std::optional(value->get<double>());
 }
 
-int JsonReader::Integer(std::string_view key) {
-  constexpr std::string_view kNeeded = "a whole number";
-  const Json* value = Find(key, true, kNeeded);
-  if (value == nullptr) {
-    return 0;
-  }
+int JsonReader::Integer(std::string_view key) { return FindInteger(key, true).value_or(0); }
+
+std::optional<int> JsonReader::OptionalInteger(std::string_view key) {
+  return FindInteger(key, false);
+}
+
+std::optional<int> JsonReader::FindInteger(std::string_view key, bool required) {
   using Limits = std::numeric_limits<int>;
+  constexpr std::string_view kNeeded = "a whole number";
+  const Json* value = Find(key, required, kNeeded);
+  if (value == nullptr) {
+    return std::nullopt;
+  }
   if (!value->is_number_integer() || value->get<double>() < Limits::min() ||
       value->get<double>() > Limits::max()) {  // as double, where no 64-bit value can wrap
-    FailType(key, *value, kNeeded);
-    return 0;
+    FailType(key, *value,
+             value->is_number_integer() ? "a whole number of at most 2147483647" : kNeeded);
+    return std::nullopt;
   }
   return value->get<int>();
 }

@@ -34,6 +34,7 @@ class JsonReader {
   std::vector<JsonReader> Objects(std::string_view key);
 
   std::optional<double> OptionalNumber(std::string_view key);
+  std::optional<int> OptionalInteger(std::string_view key);
   std::optional<std::string> OptionalString(std::string_view key);
   std::optional<std::vector<double>> OptionalNumbers(std::string_view key, size_t count);
   std::optional<JsonReader> OptionalObject(std::string_view key);
@@ -52,6 +53,7 @@ class JsonReader {
 
   // Each reads one type; nothing where the key is absent or the reader has failed.
   const nlohmann::json* Find(std::string_view key, bool required, std::string_view needed);
+  std::optional<int> FindInteger(std::string_view key, bool required);
   std::optional<double> FindNumber(std::string_view key, bool required);
   std::optional<std::string> FindString(std::string_view key, bool required);
   std::optional<std::vector<double>> FindNumbers(std::string_view key, size_t count, bool required);

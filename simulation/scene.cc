@@ -10,6 +10,7 @@ namespace sateen {
 namespace {
 
 constexpr double kPatchGround = 0.18;
+constexpr double kMostLight = 1e6;  // irradiance, or flux
 
 [[nodiscard]] tl::unexpected<Error> BadValue(std::string_view key, double value,
                                              std::string_view range) {
@@ -97,8 +98,8 @@ Status CheckIllumination(const Illumination& illumination) {
     return BadValue("illumination.bounce_rays", illumination.bounce_rays, "0 to 65536");
   }
   for (const double value : illumination.ambient_rgb) {
-    if (!(value >= 0.0 && std::isfinite(value))) {
-      return BadValue("illumination.ambient_rgb", value, "0 or more each");
+    if (!(value >= 0.0 && value <= kMostLight)) {
+      return BadValue("illumination.ambient_rgb", value, "0 to 1e6 each");
     }
   }
   if (!(illumination.flicker >= 0.0 && illumination.flicker <= 0.2)) {
@@ -143,6 +144,10 @@ Status CheckAbove(const Surface& surface, std::string_view what, const Eigen::Ve
 Status CheckPlaces(const Rig& rig, const Surface& surface) {
   Status status = CheckAbove(surface, "the camera", rig.camera->table_from_camera.translation());
   for (const Light& light : rig.lights) {
+    if (status && !(light.flux_rgb.maxCoeff() <= kMostLight)) {
+      return Fail(ErrorCode::kInvalidArgument, "light '{}': flux_rgb = {:g}; need at most {:g}",
+                  light.name, light.flux_rgb.maxCoeff(), kMostLight);
+    }
     if (status && light.model != LightModel::kDistant) {
       status = CheckAbove(surface, "light '" + light.name + "'", light.position_mm);
     }

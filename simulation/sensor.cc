@@ -27,14 +27,18 @@ Status Sensor::Validate() const {
   if (!(black_dn >= 0.0 && black_dn < white_dn && black_dn == std::floor(black_dn))) {
     return fail("black", black_dn, fmt::format("a whole number from 0 to below {:g}", white_dn));
   }
-  if (!(full_scale > 0.0 && std::isfinite(full_scale))) {
-    return fail("full_scale", full_scale, "more than 0");
+  if (!(full_scale >= 1e-6 && full_scale <= 1e6)) {
+    return fail("full_scale", full_scale, "1e-6 to 1e6");
   }
-  if (full_well_electrons && !(*full_well_electrons > 0.0 && std::isfinite(*full_well_electrons))) {
-    return fail("full_well_electrons", *full_well_electrons, "more than 0");
+  if (full_well_electrons && !(*full_well_electrons >= 1.0 && *full_well_electrons <= 1e9)) {
+    return fail("full_well_electrons", *full_well_electrons, "1 to 1e9");
   }
-  if (!(read_noise_electrons >= 0.0 && std::isfinite(read_noise_electrons))) {
-    return fail("read_noise_electrons", read_noise_electrons, "0 or more");
+  if (!(read_noise_electrons >= 0.0 && read_noise_electrons <= 1e6)) {
+    return fail("read_noise_electrons", read_noise_electrons, "0 to 1e6");
+  }
+  if (read_noise_electrons > 0.0 && !full_well_electrons) {
+    return fail("read_noise_electrons", read_noise_electrons,
+                "full_well_electrons beside it: without that there is no noise");
   }
   return {};
 }

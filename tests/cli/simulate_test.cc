@@ -137,6 +137,14 @@ TEST(SimulateCommand, ErrorsNameTheKeyAndItsRange) {
   EXPECT_THAT(log_of(R"("surface": {"shape": "plane"}, "materials": {"yarn": {}})"),
               HasSubstr("materials.surface"));
   EXPECT_THAT(flat_with(R"("fog": 1)"), HasSubstr("fog"));
+  EXPECT_THAT(flat_with(R"("lens": {"zoom": 1})"),
+              HasSubstr("lens.zoom is not known here; the keys are bump, psf_sigma_px, samples, "));
+  EXPECT_THAT(flat_with(R"("sensor": {"full_scale": 1e300})"),
+              HasSubstr("sensor.full_scale = 1e+300; need 1e-6 to 1e6"));
+  EXPECT_THAT(flat_with(R"("sensor": {"read_noise_electrons": 3})"),
+              HasSubstr("sensor.read_noise_electrons = 3; need full_well_electrons beside it"));
+  EXPECT_THAT(flat_with(R"("illumination": {"ambient_rgb": [1e300, 0, 0]})"),
+              HasSubstr("illumination.ambient_rgb = 1e+300; need 0 to 1e6 each"));
   EXPECT_THAT(flat_with(R"("sensor": {"bits": 13})"), HasSubstr("sensor.bits = 13; need 12, 14"));
   EXPECT_THAT(flat_with(R"("sensor": {"bayer": "RGBG"})"), HasSubstr("sensor.bayer 'RGBG'"));
   EXPECT_THAT(flat_with(R"("illumination": {"shadows": "soft"})"),
@@ -153,7 +161,7 @@ TEST(SimulateCommand, AMissingHeightMapIsNamed) {
                             "materials": {"surface": {"albedo": [1, 1, 1]}})");
   const RunResult run = scene.Run();
   EXPECT_EQ(run.exit_status, 4);
-  EXPECT_THAT(run.log, HasSubstr("gone.exr"));
+  EXPECT_THAT(run.log, HasSubstr("surface.file: "));
 }
 
 TEST(SimulateCommand, ALightThatNoFileCanBeNamedAfterIsRefused) {
@@ -172,6 +180,18 @@ TEST(SimulateCommand, ALightThatNoFileCanBeNamedAfterIsRefused) {
   EXPECT_EQ(run.exit_status, 3);
   EXPECT_THAT(run.log, HasSubstr("\"../x\""));
   EXPECT_FALSE(fs::exists(folder.Path() / "out"));
+}
+
+TEST(SimulateCommand, TheFolderOfTheSceneIsNoPlaceForTheSession) {
+  const SmallScene scene(kFlat);
+  const fs::path folder = fs::path(scene.Out()).parent_path();
+  const auto rig_size = fs::file_size(folder / "rig.json");
+
+  const RunResult run = Simulate({(folder / "scene.json").string(), "-o", folder.string()});
+
+  EXPECT_EQ(run.exit_status, 2);
+  EXPECT_THAT(run.log, HasSubstr("holds scene.json, which the scene is made of"));
+  EXPECT_EQ(fs::file_size(folder / "rig.json"), rig_size);
 }
 
 TEST(SimulateCommand, ALightNamedAsTheDarkFrameIsRefused) {
@@ -224,6 +244,7 @@ TEST(SimulateCommand, AMissingRigIsNamed) {
   const RunResult run = Simulate({scene, "-o", (folder.Path() / "out").string()});
 
   EXPECT_EQ(run.exit_status, 4);
+  EXPECT_THAT(run.log, HasSubstr("scene.json: rig: "));
   EXPECT_THAT(run.log, HasSubstr("gone.json"));
 }
 
