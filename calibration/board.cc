@@ -85,9 +85,10 @@ Status CheckMarkers(std::string_view text, BoardSpec& spec) {
     return Fail(ErrorCode::kInvalidArgument, "board '{}': {}", text, count.error().message);
   }
   if (*count < needed) {
-    return Fail(ErrorCode::kInvalidArgument,
-                "board '{}': {} markers, and {} has {}; choose a larger dictionary or fewer squares",
-                text, needed, spec.dictionary, *count);
+    return Fail(
+        ErrorCode::kInvalidArgument,
+        "board '{}': {} markers, and {} has {}; choose a larger dictionary or fewer squares", text,
+        needed, spec.dictionary, *count);
   }
   return {};
 }

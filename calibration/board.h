@@ -57,7 +57,7 @@ struct BoardView {
   std::vector<int> ids = {};
   std::vector<Eigen::Vector2d> corners_px = {};  // pixel centres at integers
   std::vector<Eigen::Vector3d> points_mm = {};   // the same corners in the board frame; z = 0
-  std::string name = {};                    // of the picture, for messages; may be empty
+  std::string name = {};                         // of the picture, for messages; may be empty
 };
 
 /// Finds the board in the picture, each corner to some hundredths of a pixel.

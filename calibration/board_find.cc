@@ -11,12 +11,13 @@ namespace {
 
 constexpr size_t kFewestCorners = 6;
 constexpr size_t kFewestMarkers = 3;
-constexpr double kFewestInPlace = 0.7;  // of the markers
+constexpr double kFewestInPlace = 0.9;  // of the markers
 constexpr double kMarkerSlack = 0.35;   // of a square: how far a lens may bend the board
 constexpr size_t kMarkersOfAPatch = 4;  // from which a corner's place is predicted
 constexpr double kPatchSquares = 3.0;   // squares to the farthest of them
-constexpr double kCornerReachOfGap = 0.9;
-constexpr double kCrossing = 0.25;  // of the board's contrast, below which it is no corner
+constexpr double kReachOfGap = 0.9;     // between a corner and the markers, read and refined in
+constexpr double kQuadrant = 0.35;      // of the side that CrossingContrast() is given, at most
+constexpr double kCrossing = 0.25;      // of the board's contrast, below which it is no corner
 
 // One marker of the board, seen.
 struct BoardMarker {
@@ -75,8 +76,8 @@ std::vector<BoardMarker> InPlace(const std::vector<BoardMarker>& markers, double
   return kept;
 }
 
-// The board about a corner, from the nearest markers. Nothing where there are not two within the
-// squares that meet there or beside them.
+// The board about a corner, from the nearest markers. Nothing where none is in a square that meets
+// there.
 std::optional<PlaneMap> PatchAt(const std::vector<BoardMarker>& markers,
                                 const Eigen::Vector3d& at_mm, double square_mm) {
   std::vector<std::pair<double, const BoardMarker*>> nearest;
@@ -108,7 +109,8 @@ std::optional<PlaneMap> PatchAt(const std::vector<BoardMarker>& markers,
   return FitPlaneMap(points_mm, corners_px);
 }
 
-// The corners beside the markers, refined, that look like corners.
+// The corners beside the markers, refined, that look like corners: where they have a contrast, of
+// the sign that the colours of the squares say.
 BoardView CornersBeside(const Image<uint8_t>& grey, const BoardSpec& spec,
                         const std::vector<BoardMarker>& markers) {
   struct Candidate {
@@ -118,7 +120,7 @@ BoardView CornersBeside(const Image<uint8_t>& grey, const BoardSpec& spec,
   };
   std::vector<Candidate> candidates;
   candidates.reserve(static_cast<size_t>(spec.CornerCount()));
-  const double reach_mm = kCornerReachOfGap * 0.5 * (spec.square_mm - spec.marker_mm);
+  const double reach_mm = kReachOfGap * 0.5 * (spec.square_mm - spec.marker_mm);
   double strongest = 0.0;
   for (int id = 0; id < spec.CornerCount(); ++id) {
     const Eigen::Vector3d at_mm = spec.CornerPoint(id);
@@ -126,14 +128,14 @@ BoardView CornersBeside(const Image<uint8_t>& grey, const BoardSpec& spec,
     if (!map) {
       continue;
     }
-    // Read in the gap between the corner and the markers: 0.3 of a square of that side.
     const std::optional<double> crossing =
-        CrossingContrast(grey, *map, at_mm.head<2>(), reach_mm / 0.35);
+        CrossingContrast(grey, *map, at_mm.head<2>(), reach_mm / kQuadrant);
     const Eigen::Vector2d rough = MapPoint(*map, at_mm.head<2>());
     const int window_px = CornerWindowPx(*map, at_mm.head<2>(), reach_mm);
     const Eigen::Vector2d corner = RefineCorner(grey, rough, window_px);
     if (crossing && corner != rough && (corner - rough).norm() <= window_px) {
-      candidates.push_back({id, corner, std::abs(*crossing)});
+      const bool dark_first = spec.IsBlack(id % (spec.columns - 1), id / (spec.columns - 1));
+      candidates.push_back({id, corner, dark_first ? *crossing : -*crossing});
       strongest = std::max(strongest, std::abs(*crossing));
     }
   }
@@ -159,8 +161,7 @@ Result<BoardView> FindCharuco(const Image<uint8_t>& grey, const BoardSpec& spec)
                 "name its own dictionary",
                 seen.size(), spec.dictionary, kFewestMarkers);
   }
-  const std::vector<BoardMarker> markers =
-      InPlace(BoardMarkersOf(seen, spec), spec.square_mm);
+  const std::vector<BoardMarker> markers = InPlace(BoardMarkersOf(seen, spec), spec.square_mm);
   if (static_cast<double>(markers.size()) < kFewestInPlace * static_cast<double>(seen.size())) {
     return Fail(ErrorCode::kDegenerate,
                 "{} of {} markers lie where '{}' has them; it is another board, an older pattern "

@@ -42,7 +42,8 @@ std::vector<Eigen::Vector2d> RoughCorners(const Image<uint8_t>& grey, const Boar
 
 BoardView ViewOf(const Image<uint8_t>& grey, const BoardSpec& spec,
                  std::vector<Eigen::Vector2d> corners) {
-  BoardView view = {.size_px = grey.Size(), .ids = {}, .corners_px = std::move(corners), .points_mm = {}};
+  BoardView view = {
+      .size_px = grey.Size(), .ids = {}, .corners_px = std::move(corners), .points_mm = {}};
   view.ids.reserve(view.corners_px.size());
   view.points_mm.reserve(view.corners_px.size());
   for (int id = 0; id < spec.CornerCount(); ++id) {

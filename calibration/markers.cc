@@ -62,8 +62,8 @@ std::string DictionaryFor(int bits, int count) {
 
 Image<uint8_t> MarkerCells(const std::string& dictionary, int id) {
   const cv::Ptr<cv::aruco::Dictionary> markers = DictionaryOf(dictionary);
-  const cv::Mat bits = cv::aruco::Dictionary::getBitsFromByteList(markers->bytesList.row(id),
-                                                                  markers->markerSize);
+  const cv::Mat bits =
+      cv::aruco::Dictionary::getBitsFromByteList(markers->bytesList.row(id), markers->markerSize);
   Image<uint8_t> cells(markers->markerSize + 2, markers->markerSize + 2);
   for (int y = 0; y < bits.rows; ++y) {
     for (int x = 0; x < bits.cols; ++x) {

@@ -45,8 +45,8 @@ std::optional<PlaneMap> FitPlaneMap(const std::vector<Eigen::Vector3d>& points_m
     from.emplace_back(points_mm[i].x(), points_mm[i].y());
     to.emplace_back(corners_px[i].x(), corners_px[i].y());
   }
-  const cv::Mat found = slack_px ? cv::findHomography(from, to, cv::RANSAC, *slack_px)
-                                 : cv::findHomography(from, to);
+  const cv::Mat found =
+      slack_px ? cv::findHomography(from, to, cv::RANSAC, *slack_px) : cv::findHomography(from, to);
   if (found.empty()) {
     return std::nullopt;
   }

@@ -15,9 +15,9 @@ using PlaneMap = Eigen::Matrix3d;
 
 // Least squares over at least 4 points; with `slack_px`, over those that a common map takes to
 // within it (RANSAC). Nothing where the points lie in one line.
-[[nodiscard]] std::optional<PlaneMap> FitPlaneMap(
-    const std::vector<Eigen::Vector3d>& points_mm, const std::vector<Eigen::Vector2d>& corners_px,
-    std::optional<double> slack_px = std::nullopt);
+[[nodiscard]] std::optional<PlaneMap> FitPlaneMap(const std::vector<Eigen::Vector3d>& points_mm,
+                                                  const std::vector<Eigen::Vector2d>& corners_px,
+                                                  std::optional<double> slack_px = std::nullopt);
 
 // Grey levels by which the squares to the top right and bottom left of a corner are brighter than
 // the two others. Nothing where one of them is out of the picture.

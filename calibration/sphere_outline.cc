@@ -1,27 +1,20 @@
 #include "calibration/sphere_outline.h"
 
 #include <Eigen/Geometry>
-#include <Eigen/LU>
-#include <Eigen/QR>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
-#include <random>
+
+#include "calibration/sphere_edges.h"
 
 namespace sateen {
 namespace {
 
-constexpr int kRimPoints = 720;
 constexpr std::array<double, 3> kBands = {0.08, 0.025, 0.012};  // of the radius, each way
 constexpr double kTripleTolerance = 0.006;                      // of the radius
-constexpr int kTriples = 2000;
-constexpr int kFitRounds = 8;
-constexpr double kLeastEdge = 0.004;     // of the square root of full scale, per pixel
-constexpr double kSecondaryEdge = 0.3;   // of the strongest edge along the same radius
-constexpr double kInterior = 0.97;       // of the radius
-constexpr double kMadOfNormal = 1.4826;  // standard deviation over median deviation
-constexpr double kEdgeOutlier = 3.0;     // standard deviations
+constexpr double kLeastRadiusPx = 8.0;
+constexpr double kInterior = 0.97;  // of the radius
 
 // The plane of equation (1), or the image itself.
 class OutlinePlane {
@@ -41,17 +34,15 @@ class OutlinePlane {
   }
 
   [[nodiscard]] Eigen::Vector2d ToPixel(const Eigen::Vector2d& q) const {
-    return camera_ ? PixelOfTablePoint(
-                         *camera_, camera_->table_from_camera.translation() + AtAngle(
-                             2.0 * std::atan(q.norm() / 2.0), q))
+    return camera_ ? PixelOfTablePoint(*camera_, camera_->table_from_camera.translation() +
+                                                     AtAngle(2.0 * std::atan(q.norm() / 2.0), q))
                    : q;
   }
 
   // The unit ray `angle` off the plane's axis, towards q.
   [[nodiscard]] Eigen::Vector3d AtAngle(double angle, const Eigen::Vector2d& q) const {
     const Eigen::Vector2d towards = q.norm() > 0.0 ? q.normalized() : Eigen::Vector2d::UnitX();
-    return std::cos(angle) * axis_ +
-           std::sin(angle) * (towards.x() * e1_ + towards.y() * e2_);
+    return std::cos(angle) * axis_ + std::sin(angle) * (towards.x() * e1_ + towards.y() * e2_);
   }
 
  private:
@@ -60,171 +51,6 @@ class OutlinePlane {
   Eigen::Vector3d e1_;
   Eigen::Vector3d e2_;
 };
-
-struct PlaneCircle {
-  Eigen::Vector2d center = Eigen::Vector2d::Zero();
-  double radius = 0.0;
-
-  [[nodiscard]] Eigen::Vector2d At(double angle, double scale = 1.0) const {
-    return center + scale * radius * Eigen::Vector2d(std::cos(angle), std::sin(angle));
-  }
-  [[nodiscard]] double Off(const Eigen::Vector2d& q) const { return (q - center).norm() - radius; }
-};
-
-struct RimEdge {
-  Eigen::Vector2d at;  // in the plane
-  int rim;             // which of the kRimPoints radii
-};
-
-double RimAngle(int rim) { return 2.0 * std::numbers::pi * rim / kRimPoints; }
-
-// Square root of brightness, between pixels; at the border's value outside.
-double SampleAt(const Image<float>& gray, const Eigen::Vector2d& px) {
-  const double x = std::clamp(px.x(), 0.0, gray.width - 1.0);
-  const double y = std::clamp(px.y(), 0.0, gray.height - 1.0);
-  const int x0 = std::min(static_cast<int>(x), gray.width - 2);
-  const int y0 = std::min(static_cast<int>(y), gray.height - 2);
-  const double fx = x - x0;
-  const double fy = y - y0;
-  const auto at = [&](int i, int j) {
-    return std::sqrt(std::max(0.0, static_cast<double>(gray.At(i, j))));
-  };
-  return (1 - fy) * ((1 - fx) * at(x0, y0) + fx * at(x0 + 1, y0)) +
-         fy * ((1 - fx) * at(x0, y0 + 1) + fx * at(x0 + 1, y0 + 1));
-}
-
-// The slope along a profile by the derivative of a Gaussian of `sigma` steps.
-std::vector<double> SlopesOf(const std::vector<double>& profile, double sigma) {
-  const int reach = static_cast<int>(std::ceil(3.0 * sigma));
-  std::vector<double> slopes(profile.size(), 0.0);
-  double norm = 0.0;
-  for (int k = 1; k <= reach; ++k) {
-    norm += 2.0 * k * k * std::exp(-0.5 * k * k / (sigma * sigma));
-  }
-  for (int i = reach; i + reach < static_cast<int>(profile.size()); ++i) {
-    double sum = 0.0;
-    for (int k = 1; k <= reach; ++k) {
-      sum += k * std::exp(-0.5 * k * k / (sigma * sigma)) *
-             (profile[static_cast<size_t>(i + k)] - profile[static_cast<size_t>(i - k)]);
-    }
-    slopes[static_cast<size_t>(i)] = sum / norm;
-  }
-  return slopes;
-}
-
-// The edges along the radii of `circle`, within `band` of the radius each way.
-std::vector<RimEdge> EdgesAround(const Image<float>& gray, const OutlinePlane& plane,
-                                 const PlaneCircle& circle, double radius_px, double band) {
-  const double sigma_px = std::clamp(radius_px / 200.0, 0.8, 3.0);
-  const double step_px = 0.5;
-  const int half = static_cast<int>(std::ceil((band * radius_px + 3.0 * sigma_px) / step_px)) + 2;
-  const double step = step_px / radius_px;
-  std::vector<RimEdge> edges;
-  edges.reserve(size_t{2} * kRimPoints);
-  std::vector<double> profile(static_cast<size_t>(2 * half + 1));
-  for (int rim = 0; rim < kRimPoints; ++rim) {
-    for (int i = -half; i <= half; ++i) {
-      const Eigen::Vector2d q = circle.At(RimAngle(rim), 1.0 + i * step);
-      profile[static_cast<size_t>(i + half)] = SampleAt(gray, plane.ToPixel(q));
-    }
-    std::vector<double> slopes = SlopesOf(profile, sigma_px / step_px);
-    for (double& slope : slopes) {
-      slope = std::abs(slope) / step_px;
-    }
-    const double least = std::max(kLeastEdge, kSecondaryEdge * *std::ranges::max_element(slopes));
-    for (size_t i = 1; i + 1 < slopes.size(); ++i) {
-      if (slopes[i] < least || slopes[i] < slopes[i - 1] || slopes[i] <= slopes[i + 1]) {
-        continue;
-      }
-      const double bend = slopes[i - 1] - 2.0 * slopes[i] + slopes[i + 1];
-      const double between = bend < 0.0 ? 0.5 * (slopes[i - 1] - slopes[i + 1]) / bend : 0.0;
-      const double scale = 1.0 + (static_cast<double>(i) - half + between) * step;
-      edges.push_back({circle.At(RimAngle(rim), scale), rim});
-    }
-  }
-  return edges;
-}
-
-std::optional<PlaneCircle> ThroughThree(const Eigen::Vector2d& a, const Eigen::Vector2d& b,
-                                        const Eigen::Vector2d& c) {
-  Eigen::Matrix2d sides;
-  sides << (b - a).transpose(), (c - a).transpose();
-  if (std::abs(sides.determinant()) <= 1e-6 * (b - a).norm() * (c - a).norm()) {
-    return std::nullopt;
-  }
-  const Eigen::Vector2d center =
-      a + sides.inverse() * Eigen::Vector2d((b - a).squaredNorm(), (c - a).squaredNorm()) / 2.0;
-  return PlaneCircle{center, (a - center).norm()};
-}
-
-// On how many radii an edge lies within `tolerance` of the circle.
-int RimsSeen(const std::vector<RimEdge>& edges, const PlaneCircle& circle, double tolerance) {
-  int seen = 0;
-  int last = -1;
-  for (const RimEdge& edge : edges) {
-    if (edge.rim != last && std::abs(circle.Off(edge.at)) <= tolerance) {
-      last = edge.rim;
-      ++seen;
-    }
-  }
-  return seen;
-}
-
-PlaneCircle BestOfTriples(const std::vector<RimEdge>& edges, const PlaneCircle& rough) {
-  std::mt19937 random(1);
-  PlaneCircle best = rough;
-  int most = 0;
-  for (int triple = 0; triple < kTriples && edges.size() > 3; ++triple) {
-    const auto any = [&]() -> const Eigen::Vector2d& { return edges[random() % edges.size()].at; };
-    const std::optional<PlaneCircle> circle = ThroughThree(any(), any(), any());
-    if (!circle || (circle->center - rough.center).norm() > 2.0 * kBands[0] * rough.radius) {
-      continue;
-    }
-    const int seen = RimsSeen(edges, *circle, kTripleTolerance * rough.radius);
-    if (seen > most) {
-      most = seen;
-      best = *circle;
-    }
-  }
-  return best;
-}
-
-// Equation (2) by Gauss and Newton's method, over edges within `tolerance`, which closes in on 3 robust
-// standard deviations. Leaves `edges` with those used.
-PlaneCircle FitPlaneCircle(std::vector<RimEdge>& edges, PlaneCircle circle, double tolerance) {
-  std::vector<RimEdge> used;
-  for (int round = 0; round < kFitRounds; ++round) {
-    used.clear();
-    Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
-    Eigen::Vector3d right = Eigen::Vector3d::Zero();
-    std::vector<double> sizes;
-    sizes.reserve(edges.size());
-    used.reserve(edges.size());
-    for (const RimEdge& edge : edges) {
-      const double off = circle.Off(edge.at);
-      if (std::abs(off) > tolerance) {
-        continue;
-      }
-      const Eigen::Vector2d out = (edge.at - circle.center).normalized();
-      const Eigen::Vector3d row(out.x(), out.y(), 1.0);
-      normal += row * row.transpose();
-      right += off * row;
-      sizes.push_back(std::abs(off));
-      used.push_back(edge);
-    }
-    if (used.size() < 8) {
-      break;
-    }
-    const Eigen::Vector3d change = normal.ldlt().solve(right);
-    circle.center += change.head<2>();
-    circle.radius += change[2];
-    std::ranges::nth_element(sizes, sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2));
-    tolerance = std::clamp(kEdgeOutlier * kMadOfNormal * sizes[sizes.size() / 2],
-                           2e-4 * circle.radius, tolerance);
-  }
-  edges = std::move(used);
-  return circle;
-}
 
 // The pixels inside the rim drawn closer to its centroid.
 std::vector<PixelSpan> InteriorOf(const std::vector<Eigen::Vector2d>& rim,
@@ -254,5 +80,139 @@ std::vector<PixelSpan> InteriorOf(const std::vector<Eigen::Vector2d>& rim,
   return spans;
 }
 
+// The rough circle of the image as one of the plane.
+std::optional<PlaneCircle> RoughInPlane(const OutlinePlane& plane, const Circle& rough) {
+  PlaneCircle circle;
+  const std::optional<Eigen::Vector2d> center = plane.FromPixel(rough.center_px);
+  if (!center) {
+    return std::nullopt;
+  }
+  circle.center = *center;
+  constexpr int kSides = 16;
+  for (int side = 0; side < kSides; ++side) {
+    const double angle = 2.0 * std::numbers::pi * side / kSides;
+    const Eigen::Vector2d out(std::cos(angle), std::sin(angle));
+    const std::optional<Eigen::Vector2d> q =
+        plane.FromPixel(rough.center_px + rough.radius_px * out);
+    if (!q) {
+      return std::nullopt;
+    }
+    circle.radius += (*q - circle.center).norm() / kSides;
+  }
+  return circle;
+}
+
+// Fills in where the sphere stands, from the circle in the plane.
+void Place(const OutlinePlane& plane, const PlaneCircle& circle, const SphereOptions& options,
+           Sphere& sphere) {
+  if (!options.camera) {
+    sphere.center = {circle.center.x(), -circle.center.y(), 0.0};
+    sphere.radius = circle.radius;
+    return;
+  }
+  const double t = circle.center.norm();
+  const double far_side = 2.0 * std::atan((t + circle.radius) / 2.0);
+  const double near_side = 2.0 * std::atan((t - circle.radius) / 2.0);
+  const Eigen::Vector3d axis = plane.AtAngle((far_side + near_side) / 2.0, circle.center);  // (3)
+  const double w = (far_side - near_side) / 2.0;
+  sphere.radius = options.radius_mm;
+  sphere.center = options.camera->table_from_camera.translation() +
+                  options.radius_mm / std::sin(w) * axis;  // (4)
+}
+
 }  // namespace
+
+Status SphereOptions::Validate() const {
+  if (!(least_seen > 0.0 && least_seen <= 1.0)) {
+    return Fail(ErrorCode::kInvalidArgument, "least_seen = {}; need 0 < least_seen <= 1",
+                least_seen);
+  }
+  if (camera && !(radius_mm > 0.0 && std::isfinite(radius_mm))) {
+    return Fail(ErrorCode::kInvalidArgument,
+                "radius_mm = {}; need the sphere's radius, > 0, where the camera is known",
+                radius_mm);
+  }
+  return camera ? camera->Validate("camera") : Status();
+}
+
+Result<Sphere> FindSphere(const Image<float>& gray, const Circle& rough, std::string_view name,
+                          const SphereOptions& options) {
+  if (Status status = options.Validate(); !status) {
+    return tl::unexpected(status.error());
+  }
+  if (options.camera && options.camera->size_px != gray.Size()) {
+    return Fail(ErrorCode::kBadData, "{}: {} x {} px; the camera has {} x {}", name, gray.width,
+                gray.height, options.camera->size_px.width, options.camera->size_px.height);
+  }
+  const auto cut = [&](const Eigen::Vector2d& px) {
+    return !(px.x() >= 0.0 && px.y() >= 0.0 && px.x() <= gray.width - 1.0 &&
+             px.y() <= gray.height - 1.0);
+  };
+  const auto cut_error = [&] {
+    return Fail(ErrorCode::kBadData,
+                "{}: the sphere at ({:.0f}, {:.0f}) px of radius {:.0f} px is cut by the frame of "
+                "{} x {} px; need all of it",
+                name, rough.center_px.x(), rough.center_px.y(), rough.radius_px, gray.width,
+                gray.height);
+  };
+  if (!(rough.radius_px >= kLeastRadiusPx) || cut(rough.center_px)) {
+    return cut(rough.center_px)
+               ? cut_error()
+               : Fail(ErrorCode::kDegenerate, "{}: a sphere of radius {:.1f} px; need {}", name,
+                      rough.radius_px, kLeastRadiusPx);
+  }
+  const Eigen::Vector3d axis =
+      options.camera ? RayOfPixel(*options.camera, rough.center_px.x(), rough.center_px.y())
+                           .value_or(Eigen::Vector3d::UnitZ())
+                     : Eigen::Vector3d(Eigen::Vector3d::UnitZ());
+  const OutlinePlane plane(options.camera, axis);
+  const std::optional<PlaneCircle> start = RoughInPlane(plane, rough);
+  if (!start) {
+    return Fail(ErrorCode::kDegenerate,
+                "{}: the camera's distortion cannot be undone round the sphere at ({:.0f}, {:.0f})",
+                name, rough.center_px.x(), rough.center_px.y());
+  }
+  PlaneCircle circle = *start;
+  std::vector<RimEdge> edges;
+  for (const double band : kBands) {
+    edges = EdgesAround(
+        gray, [&](const Eigen::Vector2d& q) { return plane.ToPixel(q); }, circle, rough.radius_px,
+        band);
+    const double tolerance = std::min(kTripleTolerance, band / 2.0) * circle.radius;
+    if (band == kBands.front()) {
+      circle = BestOfTriples(edges, circle, tolerance);
+    }
+    circle = FitPlaneCircle(edges, circle, tolerance);
+  }
+  Sphere sphere;
+  sphere.seen = ShareSeen(edges);
+  if (!(sphere.seen >= options.least_seen)) {
+    return Fail(ErrorCode::kDegenerate,
+                "{}: {:.0f} % of the outline of the sphere at ({:.0f}, {:.0f}) px is seen; need "
+                "{:.0f} %: light it from behind or give a mask",
+                name, 100.0 * sphere.seen, rough.center_px.x(), rough.center_px.y(),
+                100.0 * options.least_seen);
+  }
+  std::vector<Eigen::Vector2d> rim(kRimPoints);
+  for (int i = 0; i < kRimPoints; ++i) {
+    rim[static_cast<size_t>(i)] = plane.ToPixel(circle.At(i));
+    sphere.outline.center_px += rim[static_cast<size_t>(i)] / kRimPoints;
+  }
+  if (std::ranges::any_of(rim, cut)) {
+    return cut_error();
+  }
+  for (const Eigen::Vector2d& px : rim) {
+    sphere.outline.radius_px += (px - sphere.outline.center_px).norm() / kRimPoints;
+  }
+  double squares = 0.0;
+  for (const RimEdge& edge : edges) {
+    squares += circle.Off(edge.at) * circle.Off(edge.at);
+  }
+  sphere.residual_px = std::sqrt(squares / static_cast<double>(edges.size())) *
+                       sphere.outline.radius_px / circle.radius;
+  sphere.interior = InteriorOf(rim, sphere.outline.center_px);
+  Place(plane, circle, options, sphere);
+  return sphere;
+}
+
 }  // namespace sateen

@@ -9,12 +9,13 @@ namespace sateen {
 namespace {
 
 constexpr int kSearchSizePx = 256;
-constexpr int kBins = 72;             // directions round a centre
-constexpr double kLeastSeen = 0.4;    // of them
+constexpr int kLeastSidePx = 16;
+constexpr int kBins = 72;              // directions round a centre
+constexpr double kLeastSeen = 0.4;     // of them
 constexpr double kLeastRadius = 0.05;  // of the shorter side
 constexpr double kMostRadius = 0.6;
-constexpr int kCandidates = 40;  // centres that are looked at
-constexpr double kAligned = 0.94;  // cosine between gradient and radius
+constexpr int kCandidates = 40;        // centres that are looked at
+constexpr double kAligned = 0.94;      // cosine between gradient and radius
 constexpr double kStrongShare = 0.12;  // of the pixels, by gradient
 constexpr int kDustShare = 20;
 
@@ -60,8 +61,8 @@ std::vector<GradientEdge> GradientEdges(const Image<float>& small) {
     }
   }
   std::vector<float> sorted = strength.pixels;
-  const auto nth = sorted.begin() + static_cast<std::ptrdiff_t>(
-                                        (1.0 - kStrongShare) * static_cast<double>(sorted.size()));
+  const auto nth = sorted.begin() + static_cast<std::ptrdiff_t>((1.0 - kStrongShare) *
+                                                                static_cast<double>(sorted.size()));
   std::nth_element(sorted.begin(), nth, sorted.end());
   const float least = std::max(*nth, 1e-4F);
   std::vector<GradientEdge> edges;
@@ -220,6 +221,10 @@ Result<std::vector<Circle>> FindCircles(const Image<float>& gray, int count,
   const int step = std::max(1, std::max(gray.width, gray.height) / kSearchSizePx);
   const Image<float> small = Reduced(gray, step);
   const int side = std::min(small.width, small.height);
+  if (side < kLeastSidePx) {
+    return Fail(ErrorCode::kBadData, "{}: {} x {} px; too small or narrow to look for spheres in",
+                name, gray.width, gray.height);
+  }
   const int least = std::max(4, static_cast<int>(kLeastRadius * side));
   const int most = std::max(least, static_cast<int>(kMostRadius * side));
   const std::vector<GradientEdge> edges = GradientEdges(small);

@@ -57,8 +57,10 @@ Status ReadSensor(JsonReader reader, Sensor& sensor) {
     sensor = named.value_or(Sensor());
   }
   if (const auto bits = reader.OptionalInteger("bits")) {
+    if (*bits != sensor.bits) {  // a preset's own white stays with its own bits
+      sensor.white_dn = std::exp2(*bits) - 1.0;
+    }
     sensor.bits = *bits;
-    sensor.white_dn = std::exp2(sensor.bits) - 1.0;
   }
   sensor.black_dn = reader.OptionalNumber("black").value_or(sensor.black_dn);
   sensor.white_dn = reader.OptionalNumber("white").value_or(sensor.white_dn);
@@ -81,11 +83,18 @@ Status ReadExposure(JsonReader reader, ExposureRecord& exposure) {
   exposure.exposure_s = reader.Number("exposure_s");
   exposure.f_number = reader.Number("f_number");
   exposure.iso = reader.Number("iso");
-  for (const auto& [key, value] : {std::pair{"exposure_s", exposure.exposure_s},
-                                   {"f_number", exposure.f_number},
-                                   {"iso", exposure.iso}}) {
-    reader.Require(value > 0.0, key, fmt::format("{:g}; need more than 0", value));
-  }
+  // What a DNG file can hold.
+  const auto require = [&](std::string_view key, bool holds, double value, std::string_view range) {
+    reader.Require(holds, key, fmt::format("{:g}; need {}", value, range));
+  };
+  require("exposure_s", exposure.exposure_s >= 1e-6 && exposure.exposure_s <= 1e5,
+          exposure.exposure_s, "1e-6 to 1e5");
+  require("f_number", exposure.f_number >= 0.01 && exposure.f_number <= 1e4, exposure.f_number,
+          "0.01 to 1e4");
+  require(
+      "iso",
+      exposure.iso >= 1.0 && exposure.iso <= 65535.0 && exposure.iso == std::floor(exposure.iso),
+      exposure.iso, "a whole number from 1 to 65535");
   return reader.Finish();
 }
 
@@ -122,6 +131,8 @@ Result<SceneFile> ReadSceneFile(const std::filesystem::path& path) {
     file.scene.seed = static_cast<uint64_t>(std::max(*seed, 0));
   }
   JsonReader surface = top.Object("surface");
+  const std::string shape = surface.OptionalString("shape").value_or("");
+  const bool is_plane = shape == "plane" || shape == "tilted-plane";
   JsonReader materials = top.Object("materials");
   std::optional<JsonReader> illumination = top.OptionalObject("illumination");
   std::optional<JsonReader> lens = top.OptionalObject("lens");
@@ -164,6 +175,11 @@ Result<SceneFile> ReadSceneFile(const std::filesystem::path& path) {
   file.scene.rig = std::move(*rig);
   if (status = InFile(file.scene.Validate(), path); !status) {
     return tl::unexpected(status.error());
+  }
+  if (file.kind == SessionKind::kSheet && !is_plane) {
+    return Fail(ErrorCode::kBadData,
+                "{}: surface.shape is no plane, but kind is sheet; need plane or tilted-plane",
+                path.string());
   }
   if (file.kind == SessionKind::kSheet) {
     file.table_from_sheet = Eigen::Isometry3d::Identity();

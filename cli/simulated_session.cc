@@ -42,6 +42,7 @@ class SessionWriter {
                   "reads no smaller ones; use --linear",
                   size.width, size.height, kSmallestRawPx);
     }
+    RetireFormerSession();
     task_.BeginStage("geometry", file_.scene.rig.camera->size_px.height);
     Result<SceneRenderer> renderer = SceneRenderer::Create(file_.scene, task_);
     if (!renderer) {
@@ -58,6 +59,22 @@ class SessionWriter {
   }
 
  private:
+  // Frames of lights that the session in this folder had and this one has not.
+  void RetireFormerSession() {
+    const Result<Session> former = ReadSession(folder_.Dir());
+    if (!former) {
+      return;  // none, or one that is no business of ours
+    }
+    for (const SessionFrame& frame : former->frames) {
+      if (std::filesystem::path(frame.file).parent_path() == "frames") {
+        folder_.Retire(frame.file);
+      }
+      if (!frame.light.empty() && frame.light.find('/') == std::string::npos) {
+        folder_.Retire("truth/lit/" + frame.light + ".png");
+      }
+    }
+  }
+
   Status WriteTruth(const SurfaceMaps& maps) {
     return WriteExr(folder_.Stage("truth/normal.exr"), maps.normal)
         .and_then([&] { return WriteExr(folder_.Stage("truth/albedo.exr"), maps.albedo); })

@@ -59,7 +59,7 @@ Eigen::Vector3d GgxAnisotropic::Evaluate(const Eigen::Vector3d& n, const Eigen::
   if (at.n_l <= 0.0) {
     return Eigen::Vector3d::Zero();
   }
-  // A yarn that points along the normal has no direction in the surface: any will do.
+  // A tangent that points along the normal has no direction in the surface: any will do.
   Eigen::Vector3d t = spec_.tangent - n * n.dot(spec_.tangent);
   t = t.norm() > 1e-9 * spec_.tangent.norm() ? t.normalized() : n.unitOrthogonal();
   const Eigen::Vector3d b = n.cross(t);

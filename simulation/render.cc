@@ -92,7 +92,7 @@ bool MapPixel(const Scene& scene, int x, int y, const Eigen::Vector2d& shift_px,
 Result<SurfaceMaps> MapSurface(const Scene& scene, const Eigen::Vector2d& shift_px,
                                const Task& task) {
   const ImageSize size = scene.rig.camera->size_px;
-  SurfaceMaps maps{Image3(size), Image3(size), Image3(size), Image<uint8_t>(size)};
+  SurfaceMaps maps{Image3(size), Image3(size), Image3(size), Image<uint8_t>(size), shift_px};
   std::atomic<bool> all_seen = true;
   const Status status = ParallelFor(size.height, kRenderRows, task, [&](int begin, int end) {
     for (int y = begin; y < end; ++y) {
@@ -145,7 +145,7 @@ class PixelShader {
       const double cosine = Facing(n.dot(in.l));
       double visible = cosine > 0.0 ? 1.0 : 0.0;
       if (scene_.illumination.shadows == Shadows::kCast && cosine > 0.0) {
-        visible = VisibleShare(x_mm);
+        visible = VisibleShare(pixel, x_mm);
       }
       frame.lit.pixels[pixel] = static_cast<uint8_t>(std::lround(255.0 * visible));
       const double share = cosine > 0.0 ? cosine * visible : cosine;
@@ -180,20 +180,18 @@ class PixelShader {
     return IsVisible(*scene_.surface, x_mm, l, distance_mm);
   }
 
-  // Over the places of a pixel's footprint on the table that see the light.
-  [[nodiscard]] double VisibleShare(const Eigen::Vector3d& x_mm) const {
-    const Camera& camera = *scene_.rig.camera;
-    const double distance_mm = (eye_mm_ - x_mm).norm();
-    const Eigen::Matrix3d& axes = camera.table_from_camera.linear();
-    const Eigen::Vector2d across = axes.col(0).head<2>() * (distance_mm / camera.fx);
-    const Eigen::Vector2d down = axes.col(1).head<2>() * (distance_mm / camera.fy);
+  // Over the places of a pixel's footprint on the surface, taken for level, that see the light.
+  [[nodiscard]] double VisibleShare(size_t pixel, const Eigen::Vector3d& x_mm) const {
+    const auto width = static_cast<size_t>(maps_.part.width);
+    const double u = static_cast<double>(pixel % width) - maps_.shift_px.x();
+    const double v = static_cast<double>(pixel / width) - maps_.shift_px.y();
     const int count = scene_.illumination.shadow_samples;
     int visible = 0;
     for (int sample = 0; sample < count * count; ++sample) {
       const double du = (sample % count + 0.5) / count - 0.5;
       const double dv = (sample / count + 0.5) / count - 0.5;  // NOLINT: whole rows of samples
-      Eigen::Vector3d place = x_mm;
-      place.head<2>() += du * across + dv * down;
+      Eigen::Vector3d place =
+          TablePointOfPixel(*scene_.rig.camera, u + du, v + dv, x_mm.z()).value_or(x_mm);
       place.z() = scene_.surface->At(place.x(), place.y()).height_mm;
       visible += SeesLight(place, IncidentAt(*light_, place).l) ? 1 : 0;
     }
@@ -208,6 +206,8 @@ class PixelShader {
     const Eigen::Vector3d tangent = n.unitOrthogonal();
     const Eigen::Vector3d bitangent = n.cross(tangent);
     const uint64_t seed = HashOf(StreamSeed(scene_.seed, kBounceStream), pixel);
+    Eigen::Vector3d from_mm = x_mm;  // x_mm is rounded to float: rays must not start below
+    from_mm.z() = scene_.surface->At(x_mm.x(), x_mm.y()).height_mm;
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
     for (int ray = 0; ray < side * side; ++ray) {  // one direction in each cell of a square
       const auto counter = 2 * static_cast<uint64_t>(ray);
@@ -217,7 +217,7 @@ class PixelShader {
       const Eigen::Vector3d w = radius * std::cos(2.0 * std::numbers::pi * b) * tangent +
                                 radius * std::sin(2.0 * std::numbers::pi * b) * bitangent +
                                 std::sqrt(std::max(0.0, 1.0 - a)) * n;
-      sum += DirectFrom({x_mm, w});
+      sum += DirectFrom({from_mm, w});
     }
     return sum / (side * side);
   }
@@ -269,7 +269,9 @@ Result<SceneRenderer> SceneRenderer::Create(const Scene& scene, const Task& task
 }
 
 Result<RenderedFrame> SceneRenderer::Render(std::optional<size_t> light, const Task& task) {
-  const bool is_bumped = light && *light >= BumpIndex(*scene_);
+  // The dark frame is the last.
+  const size_t bump = BumpIndex(*scene_);
+  const bool is_bumped = bump < scene_->rig.lights.size() && (!light || *light >= bump);
   if (is_bumped && !bumped_) {
     Result<SurfaceMaps> maps = MapSurface(*scene_, scene_->lens.bump_px, task);
     if (!maps) {

@@ -16,6 +16,7 @@ struct SurfaceMaps {
   Image3 normal;    // unit, table frame
   Image3 albedo;    // of the Lambertian body
   Image<uint8_t> part;
+  Eigen::Vector2d shift_px = Eigen::Vector2d::Zero();  // of a bumped camera
 };
 
 struct RenderedFrame {

@@ -10,11 +10,20 @@ namespace sateen {
 namespace {
 
 constexpr double kPatchGround = 0.18;
+constexpr double kSteepest = 100.0;  // beyond it rays take too many steps to be followed
+constexpr double kLeastLength_mm = 1e-3;
 constexpr double kMostLight = 1e6;  // irradiance, or flux
 
 [[nodiscard]] tl::unexpected<Error> BadValue(std::string_view key, double value,
                                              std::string_view range) {
   return Fail(ErrorCode::kInvalidArgument, "{} = {:g}; need {}", key, value, range);
+}
+
+Status CheckLength(std::string_view key, double value_mm) {
+  if (!(value_mm >= kLeastLength_mm && value_mm <= 1.0 / kLeastLength_mm / kLeastLength_mm)) {
+    return BadValue(key, value_mm, "0.001 to 1e6");
+  }
+  return {};
 }
 
 bool IsFraction(double value) { return value >= 0.0 && value <= 1.0; }
@@ -61,16 +70,15 @@ Status CheckAlbedo(const WavyAlbedo& albedo) {
   if (!(albedo.max <= 1.0)) {
     return BadValue("texture.max", albedo.max, "max <= 1");
   }
-  return albedo.period_mm > 0.0 ? Status()
-                                : BadValue("texture.period_mm", albedo.period_mm, "more than 0");
+  return CheckLength("texture.period_mm", albedo.period_mm);
 }
 
 Status CheckAlbedo(const ChessboardAlbedo& albedo) {
   if (std::min(albedo.columns, albedo.rows) < 2) {
     return BadValue("texture.columns, rows", std::min(albedo.columns, albedo.rows), "2 or more");
   }
-  if (!(albedo.square_mm > 0.0)) {
-    return BadValue("texture.square_mm", albedo.square_mm, "more than 0");
+  if (Status status = CheckLength("texture.square_mm", albedo.square_mm); !status) {
+    return status;
   }
   if (!IsFraction(albedo.dark)) {
     return BadValue("texture.dark", albedo.dark, "0 to 1");
@@ -79,8 +87,11 @@ Status CheckAlbedo(const ChessboardAlbedo& albedo) {
 }
 
 Status CheckAlbedo(const PatchesAlbedo& albedo) {
-  if (!(albedo.patch_mm > 0.0)) {
-    return BadValue("texture.patch_mm", albedo.patch_mm, "more than 0");
+  if (albedo.values.empty()) {
+    return BadValue("texture.count", 0.0, "1 or more");
+  }
+  if (Status status = CheckLength("texture.patch_mm", albedo.patch_mm); !status) {
+    return status;
   }
   for (const double value : albedo.values) {
     if (!IsFraction(value)) {
@@ -199,6 +210,12 @@ Status Scene::Validate() const {
   }
   if (!rig.camera) {
     return Fail(ErrorCode::kInvalidArgument, "the rig has no camera; need one, for the frames");
+  }
+  if (!(surface->MaxSlope() <= kSteepest)) {
+    return Fail(ErrorCode::kInvalidArgument,
+                "surface rises by {:g} mm a millimetre somewhere; need at most {:g}, which is 89.4 "
+                "degrees",
+                surface->MaxSlope(), kSteepest);
   }
   const std::vector<std::string_view> parts = surface->Parts();
   for (size_t i = 0; i < parts.size(); ++i) {

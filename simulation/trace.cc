@@ -9,6 +9,7 @@ namespace {
 constexpr int kMaxTraceSteps = 10000;
 constexpr int kNewtonSteps = 8;
 constexpr double kTouching_mm = 1e-10;
+constexpr double kFarthest_mm = 1e6;  // beyond it, a ray looks past a plane that is tilted
 constexpr double kShadowEdge = 1e-5;  // of the detail
 
 struct Gap {
@@ -60,11 +61,11 @@ std::optional<double> FirstHit(const Surface& surface, const Ray& ray) {
     }
     t += gap.height_mm / rate;
     gap = GapAt(surface, ray, t);
-    if (ray.At(t).z() < surface.LowestMm() - 1.0) {
+    if (!(t < kFarthest_mm) || ray.At(t).z() < surface.LowestMm() - 1.0) {
       return std::nullopt;
     }
   }
-  return t;
+  return std::nullopt;
 }
 
 std::optional<double> NextHit(const Surface& surface, const Ray& ray, double distance_mm,

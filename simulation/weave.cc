@@ -255,8 +255,8 @@ Status WeaveSpec::Validate() const {
   const auto fail = [](std::string_view field, double value, std::string_view range) {
     return Fail(ErrorCode::kInvalidArgument, "{} = {:g}; need {}", field, value, range);
   };
-  if (!(pitch_mm > 0.0 && std::isfinite(pitch_mm))) {
-    return fail("pitch_mm", pitch_mm, "pitch_mm > 0");
+  if (!(pitch_mm >= 1e-3 && pitch_mm <= 1e6)) {
+    return fail("pitch_mm", pitch_mm, "0.001 to 1e6");
   }
   if (!(fill > 0.0 && fill <= 1.0)) {
     return fail("fill", fill, "0 < fill <= 1");

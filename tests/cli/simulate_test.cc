@@ -153,7 +153,13 @@ TEST(SimulateCommand, ErrorsNameTheKeyAndItsRange) {
               HasSubstr("illumination.dead: 'led-77' is no light of the rig"));
   EXPECT_THAT(flat_with(R"("lens": {"bump": {"from": "led-1"}})"), HasSubstr("shift_px"));
   EXPECT_THAT(flat_with(R"("exposure": {"exposure_s": 0, "f_number": 8, "iso": 100})"),
-              HasSubstr("exposure.exposure_s 0; need more than 0"));
+              HasSubstr("exposure.exposure_s 0; need 1e-6 to 1e5"));
+  EXPECT_THAT(surface(R"({"shape": "steps", "count": 1, "tread_mm": 5, "rise_mm": 1,
+                          "riser_mm": 1e-6})"),
+              HasSubstr("surface rises by 1e+06 mm a millimetre somewhere; need at most 100"));
+  EXPECT_THAT(log_of(R"("kind": "sheet", "surface": {"shape": "waves", "period_mm": 5,
+                        "max_slope_deg": 9}, "materials": {"surface": {"albedo": [1, 1, 1]}})"),
+              HasSubstr("surface.shape is no plane, but kind is sheet"));
 }
 
 TEST(SimulateCommand, AMissingHeightMapIsNamed) {
@@ -180,6 +186,25 @@ TEST(SimulateCommand, ALightThatNoFileCanBeNamedAfterIsRefused) {
   EXPECT_EQ(run.exit_status, 3);
   EXPECT_THAT(run.log, HasSubstr("\"../x\""));
   EXPECT_FALSE(fs::exists(folder.Path() / "out"));
+}
+
+TEST(SimulateCommand, FramesOfLightsThatAreNoMoreDoNotStay) {
+  const SmallScene scene(kFlat);
+  ASSERT_EQ(scene.Run().exit_status, 0);
+  const fs::path out = scene.Out();
+  ASSERT_TRUE(fs::exists(out / "frames/led-9.dng"));
+  WriteText(out / "frames/mine.txt", "mine");
+  std::ifstream file(out.parent_path() / "rig.json");
+  nlohmann::json rig = nlohmann::json::parse(file);
+  rig["lights"].erase(9);
+  WriteText(out.parent_path() / "rig.json", rig.dump());
+
+  ASSERT_EQ(scene.Run().exit_status, 0);
+
+  EXPECT_FALSE(fs::exists(out / "frames/led-9.dng"));
+  EXPECT_FALSE(fs::exists(out / "truth/lit/led-9.png"));
+  EXPECT_TRUE(fs::exists(out / "frames/led-8.dng"));
+  EXPECT_TRUE(fs::exists(out / "frames/mine.txt"));
 }
 
 TEST(SimulateCommand, TheFolderOfTheSceneIsNoPlaceForTheSession) {

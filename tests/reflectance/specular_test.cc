@@ -140,7 +140,7 @@ TEST(Specular, NoneGivesBackMoreThanArrives) {
   }
 }
 
-TEST(Specular, AnisotropyFollowsTheYarn) {
+TEST(Specular, AnisotropyFollowsTheTangent) {
   const GgxAnisotropic along_x({.alpha = 0.6, .anisotropy = 0.8});
   const GgxAnisotropic along_y(
       {.alpha = 0.6, .anisotropy = 0.8, .tangent = Eigen::Vector3d(0, 2, 0)});

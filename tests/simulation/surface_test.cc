@@ -35,6 +35,13 @@ Image<float> Bumps() {
   return height;
 }
 
+// As steep between its samples as a cubic can be.
+Image<float> Zigzag() {
+  Image<float> height(4, 4);
+  height.pixels = {0, 1, 0, 1, 1, 0, 1, 0, 0, -1, 0, 1, -1, 0, -1, 0};
+  return height;
+}
+
 std::vector<NamedSurface> AllSurfaces() {
   std::vector<NamedSurface> all;
   all.push_back({"plane", Made(MakePlane(0.3, 1.0))});
@@ -43,6 +50,7 @@ std::vector<NamedSurface> AllSurfaces() {
   all.push_back({"steps", Made(MakeSteps(3, 2.0, 0.5, 0.25))});
   all.push_back({"waves", Made(MakeWaves(2.0, 0.6))});
   all.push_back({"height map", Made(MakeHeightMap(Bumps(), 1.0))});
+  all.push_back({"zigzag", Made(MakeHeightMap(Zigzag(), 1.0))});
   for (const auto pattern : {WeavePattern::kPlain, WeavePattern::kTwill, WeavePattern::kSatin,
                              WeavePattern::kRib, WeavePattern::kKnit}) {
     all.push_back({"weave " + std::to_string(static_cast<int>(pattern)),
