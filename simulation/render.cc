@@ -183,8 +183,10 @@ class PixelShader {
   // Over the places of a pixel's footprint on the surface, taken for level, that see the light.
   [[nodiscard]] double VisibleShare(size_t pixel, const Eigen::Vector3d& x_mm) const {
     const auto width = static_cast<size_t>(maps_.part.width);
-    const double u = static_cast<double>(pixel % width) - maps_.shift_px.x();
-    const double v = static_cast<double>(pixel / width) - maps_.shift_px.y();
+    const size_t column = pixel % width;
+    const size_t row = pixel / width;
+    const double u = static_cast<double>(column) - maps_.shift_px.x();
+    const double v = static_cast<double>(row) - maps_.shift_px.y();
     const int count = scene_.illumination.shadow_samples;
     int visible = 0;
     for (int sample = 0; sample < count * count; ++sample) {
