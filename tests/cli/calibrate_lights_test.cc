@@ -121,7 +121,8 @@ TEST_F(CalibrateLightsCommand, OneFlatSheetAsksForTilts) {
   const RunResult wide = CalibrateLights({"--sheet", Path("flat"), "--rig", Path("rough.json"),
                                           "-o", Path("led.json"), "--model", "led", "--json"});
   ASSERT_EQ(wide.exit_status, 0) << wide.log;
-  for (const nlohmann::json& light : wide.Json().at("lights")) {
+  const nlohmann::json wide_json = wide.Json();
+  for (const nlohmann::json& light : wide_json.at("lights")) {
     EXPECT_LT(light.at("direction_error_deg"), 0.25) << light;
   }
 }
@@ -189,7 +190,8 @@ TEST_F(CalibrateLightsCommand, ASheetThatDoesNotFillTheTableIsWarnedOfAndLeftOut
 
   ASSERT_EQ(run.exit_status, 0) << run.log;
   EXPECT_THAT(run.log, HasSubstr("% of the sheet does not follow the light and is left out"));
-  for (const nlohmann::json& light : run.Json().at("lights")) {
+  const nlohmann::json run_json = run.Json();
+  for (const nlohmann::json& light : run_json.at("lights")) {
     EXPECT_LT(light.at("direction_error_deg"), 0.25) << light;
   }
 }
