@@ -6,7 +6,7 @@
 
 #include "cli/bench_simulate.h"
 #include "cli/bench_solve.h"
-#include "cli/calibrate_lights.h"
+#include "cli/calibrate.h"
 #include "cli/simulate.h"
 #include "cli/solve.h"
 #include "core/interrupt.h"
@@ -29,10 +29,8 @@ int Run(int argc, char** argv) {
   sateen::cli::AddSolve(app, solve);
   sateen::cli::SimulateArgs simulate;
   sateen::cli::AddSimulate(app, simulate);
-  CLI::App* calibrate = app.add_subcommand("calibrate", "Measure the rig: its lights");
-  calibrate->require_subcommand(1);
-  sateen::cli::CalibrateLightsArgs calibrate_lights;
-  sateen::cli::AddCalibrateLights(*calibrate, calibrate_lights);
+  sateen::cli::CalibrateArgs calibrate;
+  sateen::cli::AddCalibrate(app, calibrate);
   CLI::App* bench = app.add_subcommand("bench", "Measure speed against error on this machine");
   bench->require_subcommand(1);
   sateen::cli::BenchSolveArgs bench_solve;
@@ -54,7 +52,7 @@ int Run(int argc, char** argv) {
   } else if (app.got_subcommand("simulate")) {
     status = RunSimulate(simulate, task, std::cout, std::cerr);
   } else if (app.got_subcommand("calibrate")) {
-    status = RunCalibrateLights(calibrate_lights, task, std::cout, std::cerr);
+    status = RunCalibrate(app, calibrate, task, std::cout, std::cerr);
   } else if (bench->got_subcommand("simulate")) {
     status = RunBenchSimulate(bench_simulate, task, std::cout, std::cerr);
   } else {

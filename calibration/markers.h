@@ -1,0 +1,30 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "core/error.h"
+#include "imaging/image.h"
+
+namespace sateen {
+
+// A square marker of an ArUco dictionary as a picture shows it.
+struct MarkerView {
+  int id = 0;
+  // Top left, top right, bottom right, bottom left of the marker as printed; to about a pixel.
+  std::array<Eigen::Vector2d, 4> corners_px = {};
+};
+
+// In order of their ids. A marker of which two are seen is left out: which is meant is unknown.
+[[nodiscard]] std::vector<MarkerView> FindMarkers(const Image<uint8_t>& grey,
+                                                  const std::string& dictionary);
+
+// The crossing of edges next to `at_px`, to a few hundredths of a pixel, from the square of
+// 2 half_window_px + 1 pixels about it; `at_px` itself where the picture does not hold that square.
+[[nodiscard]] Eigen::Vector2d RefineCorner(const Image<uint8_t>& grey, const Eigen::Vector2d& at_px,
+                                           int half_window_px);
+
+}  // namespace sateen

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <Eigen/Geometry>
+
+#include "calibration/board_find.h"
+#include "calibration/pose_solve.h"
+#include "core/error.h"
+#include "rig/camera.h"
+
+namespace sateen {
+
+struct PoseFit {
+  Eigen::Isometry3d table_from_camera = Eigen::Isometry3d::Identity();
+  // How the board lies: turned about z only, its centre at the origin.
+  Eigen::Isometry3d table_from_board = Eigen::Isometry3d::Identity();
+  // Of a small rotation about the table's axes (rad), which turns the camera in its place, and of
+  // the camera's position (mm); and the standard deviations in it.
+  Matrix6d covariance = Matrix6d::Zero();
+  Eigen::Vector3d rotation_sd_rad = Eigen::Vector3d::Zero();
+  Eigen::Vector3d position_sd_mm = Eigen::Vector3d::Zero();
+  double reprojection_rms_px = 0.0;
+};
+
+/// Where the camera stands, from one board that lies flat on the table.
+///
+/// The table frame depends on how the board lies only by the board's centre, which is the origin:
+/// z is the board's normal, towards the camera; x is the camera's x axis (right in the image) laid
+/// onto the table; y = z cross x, up in the image. So the camera's own x axis never leans in y.
+/// The camera need not look straight down.
+///
+/// lens     its table_from_camera counts for nothing
+/// Errors   as SolvePlanePose(); kInvalidArgument: another picture size than the lens's
+[[nodiscard]] Result<PoseFit> FitPose(const Camera& lens, const BoardView& board);
+
+}  // namespace sateen

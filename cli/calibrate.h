@@ -1,0 +1,22 @@
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <iosfwd>
+
+#include "cli/calibrate_lights.h"
+#include "core/task.h"
+
+namespace sateen::cli {
+
+// What the subcommands of `sateen calibrate` are given; one of them runs.
+struct CalibrateArgs {
+  CalibrateLightsArgs lights;
+};
+
+void AddCalibrate(CLI::App& app, CalibrateArgs& args);
+
+// Returns the exit status.
+int RunCalibrate(const CLI::App& app, const CalibrateArgs& args, const Task& task,
+                 std::ostream& out, std::ostream& log);
+
+}  // namespace sateen::cli
