@@ -3,19 +3,11 @@
 #include <Eigen/Core>
 #include <vector>
 
+#include "calibration/sheet_sample.h"
 #include "core/error.h"
 #include "rig/light.h"
 
 namespace sateen {
-
-// White paper under one light: the mean over one block of pixels.
-struct SheetSample {
-  Eigen::Vector3d point_mm = Eigen::Vector3d::Zero();  // on the sheet, in the table frame
-  Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();   // of the sheet, likewise
-  Eigen::Vector3d radiance_rgb = Eigen::Vector3d::Zero();
-  Eigen::Vector3d sd_rgb =
-      Eigen::Vector3d::Ones();  // standard deviation of that mean, up to a factor
-};
 
 struct LightFitOptions {
   double albedo = 0.99;  // of the paper, (0, 1]
