@@ -131,8 +131,6 @@ Result<SceneFile> ReadSceneFile(const std::filesystem::path& path) {
     file.scene.seed = static_cast<uint64_t>(std::max(*seed, 0));
   }
   JsonReader surface = top.Object("surface");
-  const std::string shape = surface.OptionalString("shape").value_or("");
-  const bool is_plane = shape == "plane" || shape == "tilted-plane";
   JsonReader materials = top.Object("materials");
   std::optional<JsonReader> illumination = top.OptionalObject("illumination");
   std::optional<JsonReader> lens = top.OptionalObject("lens");
@@ -176,17 +174,16 @@ Result<SceneFile> ReadSceneFile(const std::filesystem::path& path) {
   if (status = InFile(file.scene.Validate(), path); !status) {
     return tl::unexpected(status.error());
   }
-  if (file.kind == SessionKind::kSheet && !is_plane) {
+  if (file.kind == SessionKind::kSheet && !file.scene.surface->IsPlane()) {
     return Fail(ErrorCode::kBadData,
                 "{}: surface.shape is no plane, but kind is sheet; need plane or tilted-plane",
                 path.string());
   }
-  if (file.kind == SessionKind::kSheet) {
-    file.table_from_sheet = Eigen::Isometry3d::Identity();
-    file.table_from_sheet->linear() =
-        Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(),
-                                           file.scene.surface->At(0.0, 0.0).Normal())
-            .toRotationMatrix();
+  if (const auto* print = std::get_if<PrintAlbedo>(&file.scene.materials[0].albedo)) {
+    file.target_is_printed = true;
+    file.table_from_target = print->table_from_print;
+  } else if (file.kind == SessionKind::kSheet) {
+    file.table_from_target = TableFromPlane(*file.scene.surface);
   }
   return file;
 }

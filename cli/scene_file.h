@@ -26,8 +26,9 @@ struct SceneFile {
   Scene scene;
   Sensor sensor;
   ExposureRecord exposure;
-  std::vector<std::filesystem::path> inputs;          // the scene file and the rig
-  std::optional<Eigen::Isometry3d> table_from_sheet;  // of a sheet: the plane that was rendered
+  std::vector<std::filesystem::path> inputs;           // the scene file and the rig
+  std::optional<Eigen::Isometry3d> table_from_target;  // of a sheet, and of what is printed
+  bool target_is_printed = false;  // so that frames tell its pose, and their record need not
 };
 
 /// Reads a scene file, schema sateen.scene/1 (docs/simulation.md).

@@ -8,6 +8,7 @@
 #include "core/sha256.h"
 #include "imaging/dng.h"
 #include "imaging/image_io.h"
+#include "scanner/pose_json.h"
 #include "simulation/random.h"
 #include "simulation/render.h"
 
@@ -25,7 +26,9 @@ class SessionWriter {
   SessionWriter(const SceneFile& file, FrameFormat format, const Task& task, OutputFolder& folder)
       : file_(file), format_(format), task_(task), folder_(folder) {
     session_.kind = file.kind;
-    session_.table_from_sheet = file.table_from_sheet;
+    if (file.kind == SessionKind::kSheet && !file.target_is_printed) {
+      session_.table_from_sheet = file.table_from_target;
+    }
   }
 
   Status Write() {
@@ -172,7 +175,16 @@ class SessionWriter {
     session_.rig_sha256 = Sha256(rig_json);
     return folder_.WriteText("rig.json", rig_json)
         .and_then([&] { return folder_.WriteText("truth/rig.json", rig_json); })
+        .and_then([&] { return WriteTruePose(); })
         .and_then([&] { return folder_.WriteText("session.json", SessionToJson(session_)); });
+  }
+
+  Status WriteTruePose() {
+    if (!file_.table_from_target) {
+      folder_.Retire(kTruePoseFile);
+      return {};
+    }
+    return folder_.WriteText(kTruePoseFile, TruePoseToJson(*file_.table_from_target));
   }
 
   const SceneFile& file_;
