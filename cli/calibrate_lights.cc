@@ -28,16 +28,6 @@ constexpr int kResidualPanelPx = 240;
 constexpr int kResidualColumns = 5;
 constexpr float kPercent = 100.0F;
 
-double DirectionErrorDeg(const Light& a, const Light& b, const std::vector<SheetSample>& samples) {
-  double worst = 0.0;
-  for (const SheetSample& sample : samples) {
-    const Eigen::Vector3d la = IncidentAt(a, sample.point_mm).l;
-    const Eigen::Vector3d lb = IncidentAt(b, sample.point_mm).l;
-    worst = std::max(worst, std::atan2(la.cross(lb).norm(), la.dot(lb)));
-  }
-  return worst / kRadPerDeg;
-}
-
 class LightsCalibrator {
  public:
   LightsCalibrator(const CalibrateLightsArgs& args, const Task& task) : args_(args), task_(task) {}
@@ -47,7 +37,7 @@ class LightsCalibrator {
     const Status status = ReadSheets()
                               .and_then([&] { return FitAll(); })
                               .and_then([&] { return CheckSwapped(); })
-                              .and_then([&] { return CompareWithTruth(); })
+                              .and_then([&] { return Compare(); })
                               .and_then([&] { return Draw(); });
     if (!status) {
       return tl::unexpected(status.error());
@@ -144,7 +134,16 @@ class LightsCalibrator {
     return {};
   }
 
-  Status CompareWithTruth() {
+  Status Compare() {
+    Lights truth;
+    if (Status status = CompareWithTruth(truth); !status) {
+      return status;
+    }
+    result_.ways = CompareWays(sheets_, result_.rig.lights, truth, args_.albedo);
+    return task_.CheckCancelled();
+  }
+
+  Status CompareWithTruth(Lights& truth_lights) {
     const fs::path path = args_.sheets[0] / "truth" / "rig.json";
     std::error_code ignored;
     if (!fs::exists(path, ignored)) {
@@ -154,6 +153,7 @@ class LightsCalibrator {
     if (!truth) {
       return tl::unexpected(truth.error());
     }
+    truth_lights = truth->lights;
     for (size_t k = 0; k < result_.lights.size(); ++k) {
       const Light& fitted = result_.rig.lights[k];
       const auto light = std::ranges::find(truth->lights, fitted.name, &Light::name);

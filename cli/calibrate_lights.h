@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "calibration/light_fit.h"
+#include "cli/calibrate_lights_compare.h"
 #include "core/task.h"
 #include "rig/rig.h"
 
@@ -37,6 +38,7 @@ struct LightFigures {
 struct LightsCalibration {
   Rig rig;
   std::vector<LightFigures> lights;  // in the rig's order
+  std::vector<WayFigures> ways;      // this fit is the last
   std::vector<std::string> warnings;
   std::map<std::string, std::string> sha256_of_input;
   std::filesystem::path pictures;

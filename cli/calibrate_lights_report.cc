@@ -34,6 +34,33 @@ nlohmann::json FiguresOf(const LightFigures& figures) {
   return json;
 }
 
+nlohmann::json FiguresOf(const WayFigures& way) {
+  nlohmann::json json = {{"way", way.key}};
+  const auto add = [&](std::string_view key, const std::optional<double>& value) {
+    if (value) {
+      json[std::string(key)] = *value;
+    }
+  };
+  add("flat_sheet_deg", way.flat_deg);
+  add("tilted_sheets_deg", way.tilted_deg);
+  add("direction_error_deg", way.direction_error_deg);
+  return json;
+}
+
+// How flat the sheets solve, one line for each way to calibrate.
+std::string WaysTable(const std::vector<WayFigures>& ways) {
+  const auto cell = [](const std::optional<double>& value) {
+    return value ? fmt::format("{:.3f} deg", *value) : std::string("-");
+  };
+  std::string text = fmt::format("\n{:<32} {:>14} {:>14} {:>16}\n", "off by, edge to edge",
+                                 "flat sheet", "tilted sheets", "lights, truth");
+  for (const WayFigures& way : ways) {
+    text += fmt::format("{:<32} {:>14} {:>14} {:>16}\n", way.label, cell(way.flat_deg),
+                        cell(way.tilted_deg), cell(way.direction_error_deg));
+  }
+  return text + "\n";
+}
+
 const RungFit& ChosenRung(const LightFit& fit) {
   for (const RungFit& rung : fit.rungs) {
     if (rung.light.model == fit.light.model) {
@@ -59,6 +86,10 @@ std::string JsonReport(const CalibrateLightsArgs& args, const LightsCalibration&
   for (const LightFigures& figures : result.lights) {
     report["lights"].push_back(FiguresOf(figures));
   }
+  report["ways"] = nlohmann::json::array();
+  for (const WayFigures& way : result.ways) {
+    report["ways"].push_back(FiguresOf(way));
+  }
   return report.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 
@@ -76,6 +107,11 @@ std::string TextReport(const CalibrateLightsArgs& args, const LightsCalibration&
         ChosenRung(fit).held_out_rms / fit.noise_rms,
         100.0 * static_cast<double>(fit.left_out) / static_cast<double>(fit.left_out + fit.used));
     has_truth = has_truth || figures.position_error_mm.has_value();
+  }
+  text += WaysTable(result.ways);
+  if (!result.ways.empty() && result.ways.back().flat_deg) {
+    text += fmt::format("the flat sheet solves flat to {:.3f} degrees edge to edge\n",
+                        *result.ways.back().flat_deg);
   }
   if (has_truth) {
     double position_mm = 0.0;
