@@ -54,6 +54,9 @@ class LightsCalibrator {
     if (!args_.rough_rig.empty()) {
       options.rig_file = args_.rough_rig;
     }
+    if (Status status = ReadBorder(options); !status) {
+      return status;
+    }
     for (const fs::path& dir : args_.sheets) {
       Result<Sheet> sheet = ReadSheet(dir, options, task_);
       if (!sheet) {
@@ -67,9 +70,44 @@ class LightsCalibrator {
       result_.sha256_of_input.merge(sheet->sha256_of_input);
       result_.warnings.insert(result_.warnings.end(), sheet->warnings.begin(),
                               sheet->warnings.end());
+      if (Status status = NotePose(dir, *sheet); !status) {
+        return status;
+      }
       sheets_.push_back(std::move(*sheet));
     }
     result_.rig = sheets_[0].rig;
+    return {};
+  }
+
+  Status ReadBorder(ReadSheetOptions& options) const {
+    if (args_.border.empty()) {
+      return {};
+    }
+    Result<SheetBorder> border = ParseSheetBorder(args_.border);
+    if (!border) {
+      return tl::unexpected(border.error());
+    }
+    options.border = *std::move(border);
+    options.find_poses = args_.find_poses;
+    return {};
+  }
+
+  // What is known of the sheet's pose, for the report and the warnings.
+  Status NotePose(const fs::path& dir, const Sheet& sheet) {
+    if (!sheet.found_pose && !sheet.pose_is_recorded && !sheets_.empty()) {
+      result_.warnings.push_back(
+          fmt::format("{}: its pose is neither recorded nor found, so it is taken to lie flat on "
+                      "the table; name its marker border with --border",
+                      dir.string()));
+    }
+    if (!sheet.found_pose) {
+      return {};
+    }
+    Result<SheetFigures> figures = FiguresOfSheet(dir, sheet);
+    if (!figures) {
+      return tl::unexpected(figures.error());
+    }
+    result_.sheets.push_back(*std::move(figures));
     return {};
   }
 
@@ -266,6 +304,13 @@ void AddCalibrateLights(CLI::App& calibrate, CalibrateLightsArgs& args) {
       ->required();
   cmd->add_option("-o,--output", args.output, "Rig file to write; a former one is kept as a copy")
       ->required();
+  CLI::Option* border =
+      cmd->add_option("--border", args.border,
+                      "Marker border printed on the sheets, such as sheet:A4:12mm (sateen board "
+                      "print); tells where they lie where sessions have no table_from_sheet");
+  cmd->add_flag("--find-poses", args.find_poses,
+                "Find poses by the border also where sessions have table_from_sheet")
+      ->needs(border);
   cmd->add_option("--rig", args.rough_rig,
                   "Rough rig: camera, and lights to within some 50 mm; the session's own");
   cmd->add_option("--model", args.highest_rung, "Highest rung of the model ladder: near or led")

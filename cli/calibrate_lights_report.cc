@@ -82,6 +82,7 @@ std::string JsonReport(const CalibrateLightsArgs& args, const LightsCalibration&
                            {"seconds", result.seconds},
                            {"warnings", result.warnings},
                            {"inputs", result.sha256_of_input},
+                           {"sheets", SheetsJson(result.sheets)},
                            {"lights", nlohmann::json::array()}};
   for (const LightFigures& figures : result.lights) {
     report["lights"].push_back(FiguresOf(figures));
@@ -94,9 +95,10 @@ std::string JsonReport(const CalibrateLightsArgs& args, const LightsCalibration&
 }
 
 std::string TextReport(const CalibrateLightsArgs& args, const LightsCalibration& result) {
-  std::string text = fmt::format("{:<10} {:<5} {:>9} {:>13} {:>14} {:>8} {:>15} {:>9}\n", "light",
-                                 "model", "moved mm", "position +- mm", "direction +-", "flux +-",
-                                 "misfit / noise", "left out");
+  std::string text = SheetsTable(result.sheets);
+  text += fmt::format("{:<10} {:<5} {:>9} {:>13} {:>14} {:>8} {:>15} {:>9}\n", "light", "model",
+                      "moved mm", "position +- mm", "direction +-", "flux +-", "misfit / noise",
+                      "left out");
   bool has_truth = false;
   for (const LightFigures& figures : result.lights) {
     const LightFit& fit = figures.fit;

@@ -108,10 +108,14 @@ Result<BlockMeans> Divide(const FrameFile& file, ImageSize size_px, const BlockG
 
 }  // namespace
 
-Eigen::Vector2d BlockMeans::Center(int column, int row) const {
+Eigen::AlignedBox2d BlockMeans::Extent(int column, int row) const {
   const Span x = SpanOf(column, grid.columns, size_px.width);
   const Span y = SpanOf(row, grid.rows, size_px.height);
-  return {0.5 * (x.begin + x.end - 1), 0.5 * (y.begin + y.end - 1)};
+  return {Eigen::Vector2d(x.begin, y.begin), Eigen::Vector2d(x.end - 1, y.end - 1)};
+}
+
+Eigen::Vector2d BlockMeans::Center(int column, int row) const {
+  return Extent(column, row).center();
 }
 
 Result<BlockMeans> ReadBlockMeans(const FrameFile& file, const BlockGrid& grid) {

@@ -1,6 +1,6 @@
 #pragma once
 
-#include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <vector>
 
 #include "core/error.h"
@@ -29,8 +29,9 @@ struct BlockMeans {
   std::vector<BlockMean> blocks;
   std::string sha256;
 
-  // The middle of a block. [px]
+  // The middle of a block, and its outermost pixels. [px]
   [[nodiscard]] Eigen::Vector2d Center(int column, int row) const;
+  [[nodiscard]] Eigen::AlignedBox2d Extent(int column, int row) const;
 };
 
 /// Reads a frame of a session: camera RAW straight from the mosaic, each colour from its own sites, or
