@@ -6,6 +6,7 @@
 
 #include "cli/bench_simulate.h"
 #include "cli/bench_solve.h"
+#include "cli/board.h"
 #include "cli/calibrate.h"
 #include "cli/simulate.h"
 #include "cli/solve.h"
@@ -31,6 +32,8 @@ int Run(int argc, char** argv) {
   sateen::cli::AddSimulate(app, simulate);
   sateen::cli::CalibrateArgs calibrate;
   sateen::cli::AddCalibrate(app, calibrate);
+  sateen::cli::BoardPrintArgs board_print;
+  sateen::cli::AddBoard(app, board_print);
   CLI::App* bench = app.add_subcommand("bench", "Measure speed against error on this machine");
   bench->require_subcommand(1);
   sateen::cli::BenchSolveArgs bench_solve;
@@ -53,6 +56,8 @@ int Run(int argc, char** argv) {
     status = RunSimulate(simulate, task, std::cout, std::cerr);
   } else if (app.got_subcommand("calibrate")) {
     status = RunCalibrate(app, calibrate, task, std::cout, std::cerr);
+  } else if (app.got_subcommand("board")) {
+    status = RunBoardPrint(board_print, task, std::cout, std::cerr);
   } else if (bench->got_subcommand("simulate")) {
     status = RunBenchSimulate(bench_simulate, task, std::cout, std::cerr);
   } else {
