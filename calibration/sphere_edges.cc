@@ -111,7 +111,7 @@ std::vector<RimEdge> EdgesAround(const Image<float>& gray, const PixelOfPlane& p
       const double bend = slopes[i - 1] - 2.0 * slopes[i] + slopes[i + 1];
       const double between = bend < 0.0 ? 0.5 * (slopes[i - 1] - slopes[i + 1]) / bend : 0.0;
       const double scale = 1.0 + (static_cast<double>(i) - half + between) * step;
-      edges.push_back({circle.At(rim, scale), rim});
+      edges.push_back({circle.At(rim, scale), rim, slopes[i]});
     }
   }
   return edges;
@@ -153,8 +153,8 @@ PlaneCircle FitPlaneCircle(std::vector<RimEdge>& edges, PlaneCircle circle, doub
       }
       const Eigen::Vector2d out = (edge.at - circle.center).normalized();
       const Eigen::Vector3d row(out.x(), out.y(), 1.0);
-      normal += row * row.transpose();
-      right += off * row;
+      normal += edge.slope * row * row.transpose();
+      right += edge.slope * off * row;
       sizes.push_back(std::abs(off));
       used.push_back(edge);
     }

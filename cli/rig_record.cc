@@ -32,13 +32,14 @@ void RecordCalibration(Rig& rig, std::string_view kind, nlohmann::json figures,
   rig.calibration_json = all.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 
-Result<std::filesystem::path> ReplaceRig(const std::filesystem::path& path, const Rig& rig) {
+Result<std::filesystem::path> ReplaceFile(const std::filesystem::path& path,
+                                          const std::string& text) {
   std::filesystem::path former;
   std::error_code error;
   if (std::filesystem::exists(path, error)) {
-    const Result<std::string> text = ReadFileBytes(path);
-    if (!text) {
-      return tl::unexpected(text.error());
+    const Result<std::string> kept = ReadFileBytes(path);
+    if (!kept) {
+      return tl::unexpected(kept.error());
     }
     const std::string stem = path.stem().string() + "-" + TimeAs("%Y%m%dT%H%M%SZ");
     former = path;
@@ -46,14 +47,18 @@ Result<std::filesystem::path> ReplaceRig(const std::filesystem::path& path, cons
     for (int again = 2; std::filesystem::exists(former, error); ++again) {
       former.replace_filename(fmt::format("{}-{}{}", stem, again, path.extension().string()));
     }
-    if (Status status = WriteFileWhole(former, *text); !status) {
+    if (Status status = WriteFileWhole(former, *kept); !status) {
       return tl::unexpected(status.error());
     }
   }
-  if (Status status = WriteFileWhole(path, RigToJson(rig)); !status) {
+  if (Status status = WriteFileWhole(path, text); !status) {
     return tl::unexpected(status.error());
   }
   return former;
+}
+
+Result<std::filesystem::path> ReplaceRig(const std::filesystem::path& path, const Rig& rig) {
+  return ReplaceFile(path, RigToJson(rig));
 }
 
 }  // namespace sateen::cli

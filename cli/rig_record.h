@@ -16,8 +16,12 @@ namespace sateen::cli {
 void RecordCalibration(Rig& rig, std::string_view kind, nlohmann::json figures,
                        const std::map<std::string, std::string>& sha256_of_input);
 
-// Writes the rig's file whole. One that is there already is first kept as a copy with the date and
-// time in its name, which is returned; empty where there was none.
+// Writes the file whole. One that is there already is first kept as a copy with the date and time in
+// its name, which is returned; empty where there was none.
+[[nodiscard]] Result<std::filesystem::path> ReplaceFile(const std::filesystem::path& path,
+                                                        const std::string& text);
+
+// The same with the rig's file.
 [[nodiscard]] Result<std::filesystem::path> ReplaceRig(const std::filesystem::path& path,
                                                        const Rig& rig);
 
