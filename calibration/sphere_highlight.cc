@@ -22,9 +22,9 @@ constexpr double kLumaOfHighlight = 249.5 / 255.0;  // 250 of 255, rounded
 
 // The sphere's interior, cut out of a photograph.
 struct SphereCrop {
-  Eigen::Vector2d origin;    // pixel of the crop's (0, 0)
-  cv::Mat1f smoothed;        // over a two-hundredth of the radius
-  cv::Mat1b inside;          // 255 in the interior
+  Eigen::Vector2d origin;     // pixel of the crop's (0, 0)
+  cv::Mat1f smoothed;         // over a two-hundredth of the radius
+  cv::Mat1b inside;           // 255 in the interior
   std::vector<float> values;  // of the interior
 };
 

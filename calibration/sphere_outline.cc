@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 #include "calibration/sphere_edges.h"
 
@@ -189,6 +190,7 @@ Result<Sphere> SphereOf(const OutlinePlane& plane, const PlaneCircle& circle, Im
     return CutError(size, sphere.outline, name);
   }
   sphere.interior = InteriorOf(rim, sphere.outline.center_px);
+  sphere.rim = std::move(rim);
   Place(plane, circle, options, sphere);
   return sphere;
 }

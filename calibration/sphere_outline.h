@@ -22,8 +22,9 @@ struct PixelSpan {
 struct Sphere {
   Eigen::Vector3d center = Eigen::Vector3d::Zero();
   double radius = 0.0;
-  Circle outline;                   // as it is seen: the mean circle about the outline's centroid
-  std::vector<PixelSpan> interior;  // the pixels within 97 % of the outline
+  Circle outline;                    // as it is seen: the mean circle about the outline's centroid
+  std::vector<Eigen::Vector2d> rim;  // points of the outline [px]
+  std::vector<PixelSpan> interior;   // the pixels within 97 % of the outline
   // Of an outline that was found: root mean square of edges from it, and the share of it on which an
   // edge was seen. 0 for a circle that was given.
   double residual_px = 0.0;

@@ -10,9 +10,9 @@ namespace {
 
 constexpr int kSearchSizePx = 256;
 constexpr int kLeastSidePx = 16;
-constexpr int kBins = 72;              // directions round a centre
-constexpr double kLeastSeen = 0.4;     // of them
-constexpr double kAlikeSeen = 0.8;     // of the best, where their number is not known
+constexpr int kBins = 72;           // directions round a centre
+constexpr double kLeastSeen = 0.4;  // of them
+constexpr double kAlikeSeen = 0.8;  // of the best, where their number is not known
 constexpr double kAlikeRadius = 0.5;
 constexpr double kLeastRadius = 0.05;  // of the shorter side
 constexpr double kMostRadius = 0.6;

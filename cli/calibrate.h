@@ -4,6 +4,7 @@
 #include <iosfwd>
 
 #include "cli/calibrate_lights.h"
+#include "cli/calibrate_spheres.h"
 #include "core/task.h"
 
 namespace sateen::cli {
@@ -11,6 +12,7 @@ namespace sateen::cli {
 // What the subcommands of `sateen calibrate` are given; one of them runs.
 struct CalibrateArgs {
   CalibrateLightsArgs lights;
+  CalibrateSpheresArgs spheres;
 };
 
 void AddCalibrate(CLI::App& app, CalibrateArgs& args);

@@ -18,13 +18,6 @@ double SecondsSince(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-Encoding EncodingNamed(const std::string& name) {
-  if (name == "linear") {
-    return Encoding::kLinear;
-  }
-  return name == "srgb" ? Encoding::kSrgb : Encoding::kAuto;
-}
-
 ReadCaptureOptions ReadOptionsOf(const SolveArgs& args) {
   ReadCaptureOptions options = args.read;
   options.encoding = EncodingNamed(args.encoding);
@@ -165,6 +158,13 @@ Result<SolveOutcome> SolveCapture(const SolveArgs& args, const Task& task, std::
 
 }  // namespace
 
+Encoding EncodingNamed(const std::string& name) {
+  if (name == "linear") {
+    return Encoding::kLinear;
+  }
+  return name == "srgb" ? Encoding::kSrgb : Encoding::kAuto;
+}
+
 bool Passed(const SolveArgs& args, const SolveOutcome& outcome) {
   // Not "above", so that NaN does not pass.
   return !args.fail_above_deg || (outcome.angular_error_deg.has_value() &&
@@ -176,8 +176,8 @@ void AddSolve(CLI::App& root, SolveArgs& args) {
       root.add_subcommand("solve", "Solve surface normal and albedo for every pixel of a capture");
   cmd->add_option(
          "capture", args.capture,
-         "A session folder (session.json), a DiLiGenT folder, an RTI .lp file, or a folder "
-         "of images with a lights.txt in it or one folder up")
+         "A session folder (session.json), a DiLiGenT folder, an RTI .lp file, a folder of images "
+         "with a lights.txt in it or one folder up, or with --rig a folder of images alone")
       ->required();
   cmd->add_option("-o,--output", args.output, "Folder for the maps; made where missing")
       ->required();

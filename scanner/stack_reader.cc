@@ -63,11 +63,12 @@ Result<CapturePlan> PlanByPath(const fs::path& path, const ReadCaptureOptions& o
   if (options.rig_file) {
     return PlanPhotographs(path);
   }
-  return Fail(ErrorCode::kBadData,
-              "{}: found {}, and no session.json, light_directions.txt or lights.txt, nor a "
-              "lights.txt one folder up; need one of them, the path of an .lp file, or --rig with a "
-              "light for each photograph",
-              path.string(), DescribeFolder(path));
+  return Fail(
+      ErrorCode::kBadData,
+      "{}: found {}, and no session.json, light_directions.txt or lights.txt, nor a "
+      "lights.txt one folder up; need one of them, the path of an .lp file, or --rig with a "
+      "light for each photograph",
+      path.string(), DescribeFolder(path));
 }
 
 // The rig that the caller gives instead of the lights of a public layout.

@@ -131,7 +131,8 @@ double MissDeg(const std::array<Probe, 2>& probes, bool marked, bool medians) {
       const auto& at = medians ? probes[i].medians[k] : probes[i].lamps[k];
       rays.push_back(ReflectedRay(spheres[i], cameras[i], at).value());
     }
-    squares += std::pow(LightFromRays(rays, true, "frame", {.most_position_sd = 1.0})->residual_rad, 2);
+    squares +=
+        std::pow(LightFromRays(rays, true, "frame", {.most_position_sd = 1.0})->residual_rad, 2);
   }
   return std::sqrt(squares / kFrames) / kRadPerDeg;
 }

@@ -109,9 +109,12 @@ TEST(Spheres, AMaskGivesThemToo) {
   for (int y = 0; y < mask.height; ++y) {
     for (int x = 0; x < mask.width; ++x) {
       const Eigen::Vector3d ray = RayOfPixel(camera, x, y).value();
-      mask.At(x, y) = std::ranges::any_of(Centers(), [&](const Eigen::Vector3d& center) {
-        return Mirrored(origin, ray, center, {}).has_value();
-      }) ? 255 : 0;
+      mask.At(x, y) = std::ranges::any_of(Centers(),
+                                          [&](const Eigen::Vector3d& center) {
+                                            return Mirrored(origin, ray, center, {}).has_value();
+                                          })
+                          ? 255
+                          : 0;
     }
   }
 
@@ -141,11 +144,11 @@ TEST(Spheres, DirectionsAndPositions) {
       std::vector<SphereRay> rays;
       rays.reserve(2);
       for (const Sphere& sphere : spheres) {
-        const Highlight highlight =
-            FindHighlight(frame, sphere, "frame").value();
+        const Highlight highlight = FindHighlight(frame, sphere, "frame").value();
         rays.push_back(ReflectedRay(sphere, camera, highlight.at_px).value());
         const Eigen::Vector3d truth = lamp - rays.back().from;
-        EXPECT_LT(AngleDeg(rays.back().direction, truth), 0.05);fmt::print("{:.4f} ",AngleDeg(rays.back().direction, truth));
+        EXPECT_LT(AngleDeg(rays.back().direction, truth), 0.05);
+        fmt::print("{:.4f} ", AngleDeg(rays.back().direction, truth));
 
         const Eigen::Vector3d normal = rays.back().from - sphere.center;
         EXPECT_GT(AngleDeg(normal, truth), 10.0);
