@@ -36,13 +36,16 @@ void Dot(cv::Mat3b& picture, const Eigen::Vector2d& at, double radius, const cv:
              cv::LINE_AA, kFraction);
 }
 
-// `anchor` is the share of the text's width and height that lies left of and above `at`.
+// With a halo. `anchor` is the share of the text's width and height that lies left of and above `at`.
 void Text(cv::Mat3b& picture, const std::string& text, const Eigen::Vector2d& at, double scale,
           const cv::Scalar& color, const Eigen::Vector2d& anchor = {0.0, 0.5}) {
   int below = 0;
   const cv::Size size = cv::getTextSize(text, cv::FONT_HERSHEY_SIMPLEX, scale, 1, &below);
   const cv::Point corner(static_cast<int>(at.x() - anchor.x() * size.width),
                          static_cast<int>(at.y() + (1.0 - anchor.y()) * size.height));
+  const bool on_dark = color[0] + color[1] + color[2] > 380.0;  // of 765
+  cv::putText(picture, text, corner, cv::FONT_HERSHEY_SIMPLEX, scale,
+              cv::Scalar::all(on_dark ? 0.0 : 255.0), 4, cv::LINE_AA);
   cv::putText(picture, text, corner, cv::FONT_HERSHEY_SIMPLEX, scale, color, 1, cv::LINE_AA);
 }
 
@@ -91,6 +94,12 @@ Rgb8 SpherePanel(const SpheresCalibration& result, const cv::Mat3b& shown, size_
       const Eigen::Vector2d at = scale * (highlight->at_px - corner);
       Dot(panel, at, 2.5, kYellow, -1);
       Dot(panel, at, std::max(5.0, scale * highlight->radius_px), kYellow, 1);
+    }
+  }
+  for (size_t k = 0; k < result.lights.size(); ++k) {
+    const std::optional<Highlight>& highlight = result.lights[k].highlights[index];
+    if (highlight) {
+      const Eigen::Vector2d at = scale * (highlight->at_px - corner);
       Text(panel, std::to_string(k + 1), at + Eigen::Vector2d(9.0, -9.0), 0.5, kYellow);
     }
   }
@@ -115,7 +124,7 @@ Rgb8 PolarPlot(const SpheresCalibration& result) {
     Dot(plot, middle, kPolarRadiusPx * (90 - elevation_deg) / 90.0, kPale, 1);
   }
   for (int elevation_deg = 15; elevation_deg < 90; elevation_deg += 15) {
-    Text(plot, std::to_string(elevation_deg), place(elevation_deg, 15.0), 0.4, kInk, {0.5, 0.5});
+    Text(plot, std::to_string(elevation_deg), place(elevation_deg, 345.0), 0.4, kInk, {0.5, 0.5});
   }
   for (size_t k = 0; k < result.lights.size(); ++k) {
     const Eigen::Vector3d l = result.lights[k].Direction();
