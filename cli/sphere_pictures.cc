@@ -43,7 +43,7 @@ void Text(cv::Mat3b& picture, const std::string& text, const Eigen::Vector2d& at
   const cv::Size size = cv::getTextSize(text, cv::FONT_HERSHEY_SIMPLEX, scale, 1, &below);
   const cv::Point corner(static_cast<int>(at.x() - anchor.x() * size.width),
                          static_cast<int>(at.y() + (1.0 - anchor.y()) * size.height));
-  const bool on_dark = color[0] + color[1] + color[2] > 380.0;  // of 765
+  const bool on_dark = color[0] + color[1] + color[2] > 340.0;  // of 765
   cv::putText(picture, text, corner, cv::FONT_HERSHEY_SIMPLEX, scale,
               cv::Scalar::all(on_dark ? 0.0 : 255.0), 4, cv::LINE_AA);
   cv::putText(picture, text, corner, cv::FONT_HERSHEY_SIMPLEX, scale, color, 1, cv::LINE_AA);
