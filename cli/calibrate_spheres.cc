@@ -89,6 +89,12 @@ class SpheresCalibrator {
     } else if (is_session) {
       result_.rig = capture_.rig;
     }
+    if (args_.radius_mm > 0.0 && !result_.rig.camera) {
+      return Fail(ErrorCode::kInvalidArgument,
+                  "--radius {} without a camera gives no positions; give the camera with --rig, or "
+                  "leave --radius out",
+                  args_.radius_mm);
+    }
     return {};
   }
 

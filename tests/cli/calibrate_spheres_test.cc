@@ -231,6 +231,11 @@ TEST_F(CalibrateSpheresCommand, BadPhotographsAreNamed) {
                 "ref.png: 2 of 3 spheres stand out");
   ExpectRefused({PhotosWith("lamp-1.png", Image<float>({900, 600}, 0.2F))}, "lamp-1.png");
 
+  const RunResult no_camera =
+      CalibrateSpheres({Shared("photos"), "--radius", "30", "-o", Own("lights.json")});
+  EXPECT_EQ(no_camera.exit_status, 2);
+  EXPECT_THAT(no_camera.log, HasSubstr("--radius 30 without a camera gives no positions"));
+
   const RunResult twice = CalibrateSpheres(
       {PhotosWith("lamp-1.png", RenderSpheres({Lamps()[0]}, 4.0)), "-o", Own("lights.json")});
   EXPECT_EQ(twice.exit_status, 0);
