@@ -3,8 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "calibration/markers.h"
-#include "calibration/plane_map.h"
+#include "calibration/border_view.h"
 #include "calibration/print_fit.h"
 #include "core/angle.h"
 #include "targets/marker_dictionary.h"
@@ -25,8 +24,6 @@ constexpr double kCoveredLeast = 0.08;
 constexpr double kMovedTimes = 2.0;  // the median misfit: a frame with the sheet elsewhere
 constexpr double kMovedLeast = 0.12;
 constexpr double kNotThePrint = 0.25;  // misfit
-constexpr double kWhiteShare = 0.9;    // of the pixels are darker than this, which becomes 230
-constexpr double kWhiteLevel = 230.0;
 
 Image<float> MeanOf(const std::vector<Image<float>>& frames) {
   Image<float> mean(frames[0].Size());
@@ -39,20 +36,6 @@ Image<float> MeanOf(const std::vector<Image<float>>& frames) {
   return mean;
 }
 
-Image<uint8_t> GreyOf(const Image<float>& picture) {
-  std::vector<float> sorted = picture.pixels;
-  const auto white = sorted.begin() +
-                     static_cast<std::ptrdiff_t>(kWhiteShare * static_cast<double>(sorted.size()));
-  std::nth_element(sorted.begin(), white, sorted.end());
-  const double scale = *white > 0.0F ? kWhiteLevel / static_cast<double>(*white) : 0.0;
-  Image<uint8_t> grey(picture.Size());
-  for (size_t i = 0; i < grey.pixels.size(); ++i) {
-    const double level = scale * static_cast<double>(picture.pixels[i]);
-    grey.pixels[i] = static_cast<uint8_t>(std::lround(std::clamp(level, 0.0, 255.0)));
-  }
-  return grey;
-}
-
 Camera Shrunk(const Camera& camera, int factor) {
   Camera small = camera;
   small.size_px = {camera.size_px.width / factor, camera.size_px.height / factor};
@@ -61,72 +44,6 @@ Camera Shrunk(const Camera& camera, int factor) {
   small.cx = (camera.cx + 0.5) / factor - 0.5;
   small.cy = (camera.cy + 0.5) / factor - 0.5;
   return small;
-}
-
-// Markers of the border that a picture shows, corner by corner.
-struct BorderView {
-  std::vector<int> ids;
-  std::vector<Eigen::Vector3d> points_mm;    // four a marker
-  std::vector<Eigen::Vector2d> corners_px;   // likewise
-  std::vector<Eigen::Vector2d> straight_px;  // likewise, as a lens without distortion shows them
-  size_t seen = 0;                           // markers of the dictionary, the border's or not
-};
-
-BorderView LookFor(const Image<float>& picture, const Camera& camera, const SheetBorder& border) {
-  Camera straight = camera;
-  straight.distortion = {};
-  const std::vector<Eigen::Vector3d> centers = border.MarkerCenters();
-  const double half = 0.5 * border.marker_mm;
-  BorderView view;
-  for (const MarkerView& marker : FindMarkers(GreyOf(picture), border.dictionary)) {
-    ++view.seen;
-    std::array<Eigen::Vector2d, 4> straightened;
-    bool known = static_cast<size_t>(marker.id) < centers.size();
-    for (size_t c = 0; c < 4 && known; ++c) {
-      const Eigen::Vector2d& px = marker.corners_px[c];
-      const auto ray = RayOfPixel(camera, px.x(), px.y());
-      known = ray.has_value();
-      if (known) {
-        straightened[c] =
-            PixelOfTablePoint(straight, camera.table_from_camera.translation() + *ray);
-      }
-    }
-    if (!known) {
-      continue;
-    }
-    const Eigen::Vector3d& center = centers[static_cast<size_t>(marker.id)];
-    view.ids.push_back(marker.id);
-    for (const auto& [x, y] : {std::pair(-1, 1), {1, 1}, {1, -1}, {-1, -1}}) {
-      view.points_mm.emplace_back(center + half * Eigen::Vector3d(x, y, 0.0));
-    }
-    view.corners_px.insert(view.corners_px.end(), marker.corners_px.begin(),
-                           marker.corners_px.end());
-    view.straight_px.insert(view.straight_px.end(), straightened.begin(), straightened.end());
-  }
-  return view;
-}
-
-// Those whose corners lie as on one flat sheet.
-BorderView InPlace(const BorderView& view, double slack_px) {
-  const std::optional<PlaneMap> map = FitPlaneMap(view.points_mm, view.straight_px, slack_px);
-  BorderView kept = {.seen = view.seen};
-  for (size_t i = 0; i < view.ids.size() && map; ++i) {
-    bool near = true;
-    for (size_t c = 4 * i; c < 4 * i + 4; ++c) {
-      const Eigen::Vector2d at = MapPoint(*map, view.points_mm[c].head<2>());
-      near = near && (at - view.straight_px[c]).norm() <= slack_px;
-    }
-    if (!near) {
-      continue;
-    }
-    kept.ids.push_back(view.ids[i]);
-    for (size_t c = 4 * i; c < 4 * i + 4; ++c) {
-      kept.points_mm.push_back(view.points_mm[c]);
-      kept.corners_px.push_back(view.corners_px[c]);
-      kept.straight_px.push_back(view.straight_px[c]);
-    }
-  }
-  return kept;
 }
 
 double Median(std::vector<double> values) {
@@ -175,7 +92,7 @@ class SheetFitter {
   }
 
   [[nodiscard]] BorderView Seen(const Image<float>& picture) const {
-    return InPlace(LookFor(picture, camera_, border_), kSlack * MarkerPx());
+    return InPlace(LookForBorder(picture, camera_, border_), kSlack * MarkerPx());
   }
 
   Result<BorderView> Find() {

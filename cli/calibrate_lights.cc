@@ -262,6 +262,12 @@ class LightsCalibrator {
   }
 
   void Warn() {
+    for (size_t s = 0; s < sheets_.size(); ++s) {
+      if (auto fault =
+              FaultOfSheet(args_.sheets[s], sheets_[s], result_.rig.lights, args_.albedo)) {
+        result_.warnings.push_back(*std::move(fault));
+      }
+    }
     double direction_deg = 0.0;
     double position_mm = 0.0;
     for (const LightFigures& figures : result_.lights) {

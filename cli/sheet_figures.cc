@@ -3,6 +3,7 @@
 #include <cmath>
 #include <utility>
 
+#include "calibration/sheet_fault.h"
 #include "core/angle.h"
 #include "scanner/pose_json.h"
 
@@ -33,6 +34,28 @@ Result<SheetFigures> FiguresOfSheet(const std::filesystem::path& dir, const Shee
         (figures.pose.table_from_sheet.translation() - (*truth)->translation()).norm();
   }
   return figures;
+}
+
+std::optional<std::string> FaultOfSheet(const std::filesystem::path& dir, const Sheet& sheet,
+                                        const Lights& lights, double albedo) {
+  const std::optional<SheetFault> fault = FindSheetFault(
+      sheet.samples, sheet.blocks, sheet.grid.columns, sheet.grid.rows, lights, albedo);
+  if (!fault) {
+    return std::nullopt;
+  }
+  const std::string place =
+      fmt::format("about x = {:.0f}, y = {:.0f} mm", fault->center_mm.x(), fault->center_mm.y());
+  const std::string what =
+      fault->shape == FaultShape::kRim ? "along its rim: does the paper end there?"
+      : fault->shape == FaultShape::kLine
+          ? fmt::format("along a line {:.0f} mm long and {:.0f} mm wide {}: is it a fold?",
+                        fault->length_mm, fault->width_mm, place)
+          : fmt::format("{}, over {:.0f} x {:.0f} mm: dust, a stain or a bump?", place,
+                        fault->length_mm, fault->width_mm);
+  return fmt::format(
+      "{}: {:.1f} % of the sheet does not follow the lights, most of all under "
+      "'{}', and is left out: {}",
+      dir.string(), 100.0 * fault->share, lights[fault->worst_light].name, what);
 }
 
 std::string SheetsTable(const std::vector<SheetFigures>& sheets) {

@@ -25,6 +25,12 @@ struct SheetFigures {
 [[nodiscard]] Result<SheetFigures> FiguresOfSheet(const std::filesystem::path& dir,
                                                   const Sheet& sheet);
 
+// Words on what of the sheet does not follow the fitted lights: a fold, the paper's edge. Nothing
+// where it all does.
+[[nodiscard]] std::optional<std::string> FaultOfSheet(const std::filesystem::path& dir,
+                                                      const Sheet& sheet, const Lights& lights,
+                                                      double albedo);
+
 // A line a sheet, and an empty one; empty without any.
 [[nodiscard]] std::string SheetsTable(const std::vector<SheetFigures>& sheets);
 [[nodiscard]] nlohmann::json SheetsJson(const std::vector<SheetFigures>& sheets);

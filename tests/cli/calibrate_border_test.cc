@@ -139,6 +139,28 @@ TEST_F(CalibrateBorder, RecordedPosesComeFirst) {
   EXPECT_EQ(found.Json().at("sheets").size(), 1U);
 }
 
+// A fold along y, 0.6 mm deep and 4.5 mm wide.
+TEST_F(CalibrateBorder, AFoldAcrossASheetIsNamedWithItsPlace) {
+  WriteText(Path("fold.json"),
+            fmt::format(R"({{"schema": "sateen.scene/1", "rig": "{}/rigs/ring10.json", "seed": 3,
+                "surface": {{"shape": "groove", "depth_mm": 0.6, "opening_deg": 150}},
+                "materials": {{"surface": {{"albedo": [0.99, 0.99, 0.99]}}}},
+                "sensor": {{"preset": "nikon-d5100", "black": 600, "full_scale": 1.5}}}})",
+                        Samples().string()));
+  ASSERT_EQ(Simulate({Path("fold.json"), "-o", Path("fold")}).exit_status, 0);
+  nlohmann::json session = ReadJson(Path("fold/session.json"));
+  session["kind"] = "sheet";
+  WriteText(Path("fold/session.json"), session.dump());
+
+  const RunResult run = Calibrate({"fold"}, {});
+
+  ASSERT_EQ(run.exit_status, 0) << run.log;
+  EXPECT_THAT(run.log, HasSubstr("fold: "));
+  EXPECT_THAT(run.log,
+              HasSubstr("of the sheet does not follow the lights, most of all under 'led-"));
+  EXPECT_THAT(run.log, HasSubstr("mm long and 4 mm wide about x = 1, y = 0 mm: is it a fold?"));
+}
+
 TEST_F(CalibrateBorder, WhatIsWrongWithABorderIsNamedAndNothingIsWritten) {
   const auto log_of = [&](const std::string& sheet, const std::string& border) {
     const RunResult run = Calibrate({sheet}, {"--border", border});
