@@ -1,6 +1,8 @@
 #include "cli/solve.h"
 
+#include <Eigen/Geometry>
 #include <chrono>
+#include <cmath>
 #include <filesystem>
 #include <ostream>
 #include <utility>
@@ -30,6 +32,25 @@ ReadCaptureOptions ReadOptionsOf(const SolveArgs& args) {
   return options;
 }
 
+// From pixel to pixel on the table, in the middle of the picture. [mm]
+std::optional<double> PitchOnTable(const Rig& rig) {
+  if (!rig.camera) {
+    return std::nullopt;
+  }
+  const auto seen = [&](double right, double down) {
+    return TablePointOfPixel(*rig.camera, 0.5 * rig.camera->size_px.width + right,
+                             0.5 * rig.camera->size_px.height + down);
+  };
+  const std::optional<Eigen::Vector3d> middle = seen(0.0, 0.0);
+  const std::optional<Eigen::Vector3d> right = seen(1.0, 0.0);
+  const std::optional<Eigen::Vector3d> down = seen(0.0, 1.0);
+  if (!middle || !right || !down) {
+    return std::nullopt;
+  }
+  const double area = (*right - *middle).cross(*down - *middle).norm();
+  return area > 0.0 ? std::optional(std::sqrt(area)) : std::nullopt;
+}
+
 // Compares with truth where there is any; `error_map_deg` receives the angles.
 Status Evaluate(SolveOutcome& outcome, std::optional<Image<float>>& error_map_deg) {
   const std::optional<Truth>& truth = outcome.capture.truth;
@@ -46,6 +67,13 @@ Status Evaluate(SolveOutcome& outcome, std::optional<Image<float>>& error_map_de
   }
   outcome.angular_error_deg = *angle;
   error_map_deg = std::move(map);
+  if (const std::optional<double> pitch_mm = PitchOnTable(outcome.capture.rig)) {
+    const Result<ErrorStatistics> slow =
+        LowFrequencyErrorDeg(outcome.field, truth->normal, *pitch_mm);
+    if (slow && slow->count > 0) {
+      outcome.low_frequency_error_deg = *slow;
+    }
+  }
   if (truth->albedo) {
     const Result<ErrorStatistics> albedo = RelativeAlbedoError(outcome.field, *truth->albedo);
     if (!albedo) {

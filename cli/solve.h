@@ -36,6 +36,7 @@ struct SolveOutcome {
   Capture capture;
   NormalField field;
   std::optional<ErrorStatistics> angular_error_deg;
+  std::optional<ErrorStatistics> low_frequency_error_deg;  // where the rig has a camera, too
   std::optional<ErrorStatistics> albedo_error;
   double seconds_reading = 0.0;
   double seconds_total = 0.0;
