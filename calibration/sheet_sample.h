@@ -13,4 +13,7 @@ struct SheetSample {
       Eigen::Vector3d::Ones();  // standard deviation of that mean, up to a factor
 };
 
+// Why a light has no samples.
+enum class FrameFault { kNone, kDark, kSaturated };
+
 }  // namespace sateen

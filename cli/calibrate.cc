@@ -9,6 +9,7 @@ void AddCalibrate(CLI::App& app, CalibrateArgs& args) {
   calibrate->require_subcommand(1);
   AddCalibrateLights(*calibrate, args.lights);
   AddCalibrateSpheres(*calibrate, args.spheres);
+  AddCalibrateCheck(*calibrate, args.check);
 }
 
 int RunCalibrate(const CLI::App& app, const CalibrateArgs& args, const Task& task,
@@ -17,6 +18,9 @@ int RunCalibrate(const CLI::App& app, const CalibrateArgs& args, const Task& tas
   const std::string& name = chosen->get_name();
   if (name == "spheres") {
     return RunCalibrateSpheres(args.spheres, task, out, log);
+  }
+  if (name == "check") {
+    return RunCalibrateCheck(args.check, task, out, log);
   }
   SATEEN_CHECK(name == "lights");
   return RunCalibrateLights(args.lights, task, out, log);

@@ -3,6 +3,7 @@
 #include <CLI/CLI.hpp>
 #include <iosfwd>
 
+#include "cli/calibrate_check.h"
 #include "cli/calibrate_lights.h"
 #include "cli/calibrate_spheres.h"
 #include "core/task.h"
@@ -13,6 +14,7 @@ namespace sateen::cli {
 struct CalibrateArgs {
   CalibrateLightsArgs lights;
   CalibrateSpheresArgs spheres;
+  CalibrateCheckArgs check;
 };
 
 void AddCalibrate(CLI::App& app, CalibrateArgs& args);

@@ -35,6 +35,14 @@ Result<std::vector<Eigen::Vector3d>> MeanOfDark(const std::vector<FrameFile>& da
   return mean;
 }
 
+Eigen::Vector3d MeanOf(const std::vector<Eigen::Vector3d>& blocks) {
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  for (const Eigen::Vector3d& block : blocks) {
+    mean += block / static_cast<double>(blocks.size());
+  }
+  return mean;
+}
+
 // Variance of a site over its radiance, for each colour: on white paper all noise is that of the
 // light. One figure for the frame, because what a single block shows is uncertain by a third, and
 // weights as uncertain as that cost precision; the median, so that folds and edges do not count.
@@ -98,8 +106,9 @@ std::vector<BlockSample> BlockSamplesOf(const BlockMeans& means,
   return blocks;
 }
 
+// `allow_bad`: what is wrong with more than half of a frame goes into sheet.faults.
 Status CheckFrame(const FrameFile& file, const std::vector<BlockSample>& blocks, size_t light,
-                  Sheet& sheet) {
+                  bool allow_bad, Sheet& sheet) {
   const auto share = [&](auto is_so) {
     return static_cast<double>(std::ranges::count_if(blocks, is_so)) /
            static_cast<double>(blocks.size());
@@ -107,6 +116,10 @@ Status CheckFrame(const FrameFile& file, const std::vector<BlockSample>& blocks,
   const double saturated = share([](const BlockSample& block) { return block.saturated; });
   const double unlit = share([](const BlockSample& block) { return !block.is_lit; });
   const std::string& name = sheet.rig.lights[light].name;
+  if (allow_bad && std::max(saturated, unlit) > kMostSpoilt) {
+    sheet.faults[light] = saturated > kMostSpoilt ? FrameFault::kSaturated : FrameFault::kDark;
+    return {};
+  }
   if (saturated > kMostSpoilt) {
     return Fail(ErrorCode::kBadData,
                 "{}: {:.0f} % of the sheet under light '{}' is saturated; need less than half, and "
@@ -178,9 +191,11 @@ Status FindPose(const std::filesystem::path& dir, const CapturePlan& plan,
                 const SheetBorder& border, const Task& task, Sheet& sheet) {
   std::vector<FrameFile> lit;
   std::vector<std::string> names;
-  for (const std::optional<FrameFile>& file : plan.lit) {
-    lit.push_back(*file);
-    names.push_back(file->path.lexically_relative(dir).string());
+  for (size_t k = 0; k < plan.lit.size(); ++k) {
+    if (sheet.faults[k] == FrameFault::kNone) {
+      lit.push_back(*plan.lit[k]);
+      names.push_back(plan.lit[k]->path.lexically_relative(dir).string());
+    }
   }
   task.BeginStage("pose of " + dir.filename().string(), static_cast<int>(lit.size()));
   const Camera& camera = *sheet.rig.camera;
@@ -202,7 +217,7 @@ Status FindPose(const std::filesystem::path& dir, const CapturePlan& plan,
   return {};
 }
 
-Status CheckPlan(const std::filesystem::path& dir, const CapturePlan& plan) {
+Status CheckPlan(const std::filesystem::path& dir, const CapturePlan& plan, bool allow_missing) {
   if (plan.session->kind != SessionKind::kSheet) {
     return Fail(ErrorCode::kBadData, "{}: is a session of kind '{}'; need a sheet", dir.string(),
                 Name(plan.session->kind));
@@ -213,8 +228,11 @@ Status CheckPlan(const std::filesystem::path& dir, const CapturePlan& plan) {
                 "place on the sheet",
                 dir.string());
   }
+  if (std::ranges::none_of(plan.lit, [](const auto& file) { return file.has_value(); })) {
+    return Fail(ErrorCode::kBadData, "{}: has no lit frame", dir.string());
+  }
   for (size_t k = 0; k < plan.lit.size(); ++k) {
-    if (!plan.lit[k]) {
+    if (!plan.lit[k] && !allow_missing) {
       return Fail(ErrorCode::kBadData, "{}: has no frame of light '{}'", dir.string(),
                   plan.rig.lights[k].name);
     }
@@ -230,7 +248,7 @@ Result<Sheet> ReadSheet(const std::filesystem::path& dir, const ReadSheetOptions
   if (!plan) {
     return tl::unexpected(plan.error());
   }
-  if (Status status = CheckPlan(dir, *plan); !status) {
+  if (Status status = CheckPlan(dir, *plan, options.allow_bad_frames); !status) {
     return tl::unexpected(status.error());
   }
   Sheet sheet{.rig = plan->rig, .grid = options.grid};
@@ -240,25 +258,36 @@ Result<Sheet> ReadSheet(const std::filesystem::path& dir, const ReadSheetOptions
   const size_t count = plan->lit.size();
   sheet.samples.resize(count);
   sheet.blocks.resize(count);
+  sheet.faults.resize(count, FrameFault::kNone);
   task.BeginStage("reading " + dir.filename().string(),
                   static_cast<int>(count + plan->dark.size()));
   const Result<std::vector<Eigen::Vector3d>> dark = MeanOfDark(plan->dark, options.grid, sheet);
   if (!dark) {
     return tl::unexpected(dark.error());
   }
+  if (!dark->empty()) {
+    sheet.dark_rgb = MeanOf(*dark);
+  }
   task.Advance(static_cast<int>(plan->dark.size()));
   std::vector<Result<BlockMeans>> means(count);
   const Status ran = ParallelFor(static_cast<int>(count), 1, task, [&](int begin, int end) {
     for (int k = begin; k < end; ++k) {
-      means[static_cast<size_t>(k)] =
-          ReadBlockMeans(*plan->lit[static_cast<size_t>(k)], options.grid);
+      if (const std::optional<FrameFile>& file = plan->lit[static_cast<size_t>(k)]) {
+        means[static_cast<size_t>(k)] = ReadBlockMeans(*file, options.grid);
+      }
     }
   });
   if (!ran) {
     return tl::unexpected(ran.error());
   }
-  std::vector<std::vector<BlockSample>> blocks;
+  std::vector<std::vector<BlockSample>> blocks(count);
+  size_t any = 0;  // a frame that there is
   for (size_t k = 0; k < count; ++k) {
+    if (!plan->lit[k]) {
+      sheet.faults[k] = FrameFault::kDark;
+      continue;
+    }
+    any = k;
     const FrameFile& file = *plan->lit[k];
     if (!means[k]) {
       return tl::unexpected(means[k].error());
@@ -269,8 +298,8 @@ Result<Sheet> ReadSheet(const std::filesystem::path& dir, const ReadSheetOptions
                   sheet.rig.camera->size_px.width, sheet.rig.camera->size_px.height);
     }
     sheet.sha256_of_input[file.path.string()] = means[k]->sha256;
-    blocks.push_back(BlockSamplesOf(*means[k], *dark));
-    if (Status status = CheckFrame(file, blocks[k], k, sheet); !status) {
+    blocks[k] = BlockSamplesOf(*means[k], *dark);
+    if (Status status = CheckFrame(file, blocks[k], k, options.allow_bad_frames, sheet); !status) {
       return tl::unexpected(status.error());
     }
   }
@@ -279,9 +308,11 @@ Result<Sheet> ReadSheet(const std::filesystem::path& dir, const ReadSheetOptions
       return tl::unexpected(status.error());
     }
   }
-  const auto places = PlacesOf(*means[0], sheet, options.border);
+  const auto places = PlacesOf(*means[any], sheet, options.border);
   for (size_t k = 0; k < count; ++k) {
-    AddSamples(blocks[k], places, k, sheet);
+    if (sheet.faults[k] == FrameFault::kNone) {
+      AddSamples(blocks[k], places, k, sheet);
+    }
   }
   return sheet;
 }

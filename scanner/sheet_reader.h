@@ -24,6 +24,9 @@ struct ReadSheetOptions {
   // border, and samples are taken from the blank inside alone.
   std::optional<SheetBorder> border = std::nullopt;
   bool find_poses = false;  // by the border, also where they are recorded
+  // A frame that is dark or saturated over more than half of the sheet, or missing, leaves its light
+  // without samples, with the reason in Sheet::faults, in place of an error.
+  bool allow_bad_frames = false;
 };
 
 // A session of white paper: for each light of the rig what the sheet shows of it.
@@ -35,6 +38,8 @@ struct Sheet {
   BlockGrid grid;
   std::vector<std::vector<SheetSample>> samples;  // [light][block that can be used, row by row]
   std::vector<std::vector<int>> blocks;           // [light]: which block each sample is
+  std::vector<FrameFault> faults;           // [light]: kNone, or why it has no samples
+  std::optional<Eigen::Vector3d> dark_rgb;  // mean radiance of the dark frames
   std::vector<std::string> warnings;
   std::map<std::string, std::string> sha256_of_input;
 };

@@ -38,12 +38,14 @@ inline std::vector<Eigen::Vector3d> SheetNormals(int count) {
   return normals;
 }
 
-inline std::vector<SheetSample> SamplesOf(const SyntheticCamera& camera, const Light& light,
-                                          int sheets, uint64_t seed) {
+// Sheets through the table's origin with these normals.
+inline std::vector<SheetSample> SamplesOn(const std::vector<Eigen::Vector3d>& normals,
+                                          const SyntheticCamera& camera, const Light& light,
+                                          uint64_t seed) {
   const Eigen::Vector3d eye_mm = camera.camera.table_from_camera.translation();
   std::vector<SheetSample> samples;
   uint64_t counter = 0;
-  for (const Eigen::Vector3d& normal : SheetNormals(sheets)) {
+  for (const Eigen::Vector3d& normal : normals) {
     for (int row = 0; row < camera.rows; ++row) {
       for (int column = 0; column < camera.columns; ++column) {
         const double u = (column + 0.5) * camera.camera.size_px.width / camera.columns - 0.5;
@@ -66,6 +68,11 @@ inline std::vector<SheetSample> SamplesOf(const SyntheticCamera& camera, const L
     }
   }
   return samples;
+}
+
+inline std::vector<SheetSample> SamplesOf(const SyntheticCamera& camera, const Light& light,
+                                          int sheets, uint64_t seed) {
+  return SamplesOn(SheetNormals(sheets), camera, light, seed);
 }
 
 }  // namespace sateen::testing
