@@ -79,7 +79,7 @@ double CheckSystem::SpreadTogether(size_t light, const RigChange& change) const 
   double single_count = 0.0;
   double square_count = 0.0;
   for (size_t s = 0; s < sheets_.size(); ++s) {
-    const SheetView& sheet = sheets_[s];
+    const CheckedSheet& sheet = sheets_[s];
     const std::vector<double> off = Residuals(s, light, change);
     const double limit = kSettleOutlierScale * SpreadOf(off);
     std::map<int, std::pair<double, double>> sums;  // of a square: sum, count

@@ -16,7 +16,7 @@ CheckSystem::Normal& CheckSystem::Normal::operator+=(const Normal& other) {
   return *this;
 }
 
-CheckSystem::CheckSystem(const Rig& rig, const std::vector<SheetView>& sheets, double albedo,
+CheckSystem::CheckSystem(const Rig& rig, const std::vector<CheckedSheet>& sheets, double albedo,
                          const std::vector<bool>& used, const Task& task)
     : rig_(rig),
       sheets_(sheets),
@@ -24,7 +24,7 @@ CheckSystem::CheckSystem(const Rig& rig, const std::vector<SheetView>& sheets, d
       used_(used),
       task_{.threads = task.threads},
       weights_(rig.lights.size()) {
-  for (const SheetView& sheet : sheets) {
+  for (const CheckedSheet& sheet : sheets) {
     planes_.push_back(PlaneOf(sheet));
   }
   (void)ParallelFor(static_cast<int>(used.size()), 1, task_, [&](int begin, int end) {
@@ -36,7 +36,7 @@ CheckSystem::CheckSystem(const Rig& rig, const std::vector<SheetView>& sheets, d
   });
 }
 
-CheckSystem::Plane CheckSystem::PlaneOf(const SheetView& sheet) {
+CheckSystem::Plane CheckSystem::PlaneOf(const CheckedSheet& sheet) {
   Plane plane;
   const auto lit = std::ranges::find_if(sheet.samples, [](const auto& s) { return !s.empty(); });
   if (lit == sheet.samples.end()) {

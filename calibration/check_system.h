@@ -12,7 +12,7 @@
 namespace sateen {
 
 // One sheet as every light of a rig shows it (scanner/sheet_reader.h).
-struct SheetView {
+struct CheckedSheet {
   int columns = 0;  // blocks of a frame
   int rows = 0;
   std::vector<std::vector<SheetSample>> samples;  // [light]; empty: no usable frame
@@ -79,7 +79,7 @@ struct ChangeGain {
 class CheckSystem {
  public:
   // The rig has a camera; `used[k]`: whether light k takes part. Both outlive the system.
-  CheckSystem(const Rig& rig, const std::vector<SheetView>& sheets, double albedo,
+  CheckSystem(const Rig& rig, const std::vector<CheckedSheet>& sheets, double albedo,
               const std::vector<bool>& used, const Task& task);
 
   [[nodiscard]] ChangeFit Fit(const ChangeMask& mask, const RigChange& start) const;
@@ -120,7 +120,7 @@ class CheckSystem {
   };
   using Weights = std::vector<std::vector<double>>;  // [sheet][sample] of one light
 
-  [[nodiscard]] static Plane PlaneOf(const SheetView& sheet);
+  [[nodiscard]] static Plane PlaneOf(const CheckedSheet& sheet);
   // Which unknowns of one light and sheet need derivatives.
   using Wanted = std::array<bool, kLocal>;
 
@@ -140,7 +140,7 @@ class CheckSystem {
   [[nodiscard]] double SpreadTogether(size_t light, const RigChange& change) const;
 
   const Rig& rig_;
-  const std::vector<SheetView>& sheets_;
+  const std::vector<CheckedSheet>& sheets_;
   double albedo_;
   std::vector<bool> used_;
   Task task_;

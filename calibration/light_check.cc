@@ -53,7 +53,7 @@ double WorstDirectionChange(const std::vector<SheetSample>& samples,
 
 class Checker {
  public:
-  Checker(const Rig& rig, const std::vector<SheetView>& sheets, const LightCheckOptions& options,
+  Checker(const Rig& rig, const std::vector<CheckedSheet>& sheets, const LightCheckOptions& options,
           std::vector<bool> used, const Task& task, RigCheck& check)
       : rig_(rig),
         sheets_(sheets),
@@ -221,7 +221,7 @@ class Checker {
   }
 
   const Rig& rig_;
-  const std::vector<SheetView>& sheets_;
+  const std::vector<CheckedSheet>& sheets_;
   const LightCheckOptions& options_;
   std::vector<bool> used_;
   Task task_;
@@ -233,7 +233,7 @@ class Checker {
   Eigen::Vector3d common_ = Eigen::Vector3d::Zero();  // log flux of all lights
 };
 
-Status CheckArguments(const Rig& rig, const std::vector<SheetView>& sheets) {
+Status CheckArguments(const Rig& rig, const std::vector<CheckedSheet>& sheets) {
   if (!rig.camera) {
     return Fail(ErrorCode::kInvalidArgument,
                 "the rig has no camera; calibrate lens and pose first");
@@ -286,7 +286,7 @@ Status LightCheckOptions::Validate() const {
       .and_then([&] { return InRange("significance", significance, 1.99, 100.01); });
 }
 
-Result<RigCheck> CheckRig(const Rig& rig, const std::vector<SheetView>& sheets,
+Result<RigCheck> CheckRig(const Rig& rig, const std::vector<CheckedSheet>& sheets,
                           const std::vector<FrameFault>& faults, const LightCheckOptions& options,
                           const Task& task) {
   if (Status status = options.Validate().and_then([&] { return CheckArguments(rig, sheets); });
@@ -299,7 +299,7 @@ Result<RigCheck> CheckRig(const Rig& rig, const std::vector<SheetView>& sheets,
   for (size_t k = 0; k < rig.lights.size(); ++k) {
     LightCheck& light = check.lights[k];
     const bool has_samples = std::ranges::all_of(
-        sheets, [&](const SheetView& s) { return s.samples[k].size() >= kFewestSamples; });
+        sheets, [&](const CheckedSheet& s) { return s.samples[k].size() >= kFewestSamples; });
     if (!has_samples) {
       light.verdict =
           faults[k] == FrameFault::kSaturated ? LightVerdict::kSaturated : LightVerdict::kDark;

@@ -104,7 +104,7 @@ struct RigCheck {
 /// Errors   kInvalidArgument: an option out of range; no camera; a distant light
 ///          kDegenerate: no light with at least 50 samples
 /// Cost     about 0.1 ms a sample
-[[nodiscard]] Result<RigCheck> CheckRig(const Rig& rig, const std::vector<SheetView>& sheets,
+[[nodiscard]] Result<RigCheck> CheckRig(const Rig& rig, const std::vector<CheckedSheet>& sheets,
                                         const std::vector<FrameFault>& faults,
                                         const LightCheckOptions& options = {},
                                         const Task& task = {});

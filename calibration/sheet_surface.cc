@@ -33,7 +33,7 @@ struct BlockSystem {
 
 }  // namespace
 
-SheetSurface SurfaceOf(const SheetView& sheet, const Lights& lights,
+SheetSurface SurfaceOf(const CheckedSheet& sheet, const Lights& lights,
                        const ExpectedGreen& expected) {
   std::vector<BlockSystem> blocks(static_cast<size_t>(sheet.columns) *
                                   static_cast<size_t>(sheet.rows));

@@ -30,7 +30,7 @@ struct SheetSurface {
 ///
 /// height, slope, is_off are left to the caller. Nothing is found with fewer than four lights.
 using ExpectedGreen = std::function<double(size_t light, const SheetSample& sample)>;
-[[nodiscard]] SheetSurface SurfaceOf(const SheetView& sheet, const Lights& lights,
+[[nodiscard]] SheetSurface SurfaceOf(const CheckedSheet& sheet, const Lights& lights,
                                      const ExpectedGreen& expected);
 
 }  // namespace sateen

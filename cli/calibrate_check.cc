@@ -122,7 +122,7 @@ class RigChecker {
 
   const CalibrateCheckArgs& args_;
   const Task task_;
-  std::vector<SheetView> views_;
+  std::vector<CheckedSheet> views_;
   std::vector<FrameFault> faults_;
   CalibrationCheck result_;
 };

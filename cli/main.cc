@@ -4,6 +4,7 @@
 #include <iostream>
 #include <new>
 
+#include "cli/bench_calibrate.h"
 #include "cli/bench_simulate.h"
 #include "cli/bench_solve.h"
 #include "cli/board.h"
@@ -40,6 +41,8 @@ int Run(int argc, char** argv) {
   sateen::cli::AddBenchSolve(*bench, bench_solve);
   sateen::cli::BenchSimulateArgs bench_simulate;
   sateen::cli::AddBenchSimulate(*bench, bench_simulate);
+  sateen::cli::BenchCalibrateArgs bench_calibrate;
+  sateen::cli::AddBenchCalibrate(*bench, bench_calibrate);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
@@ -60,6 +63,8 @@ int Run(int argc, char** argv) {
     status = RunBoardPrint(board_print, task, std::cout, std::cerr);
   } else if (bench->got_subcommand("simulate")) {
     status = RunBenchSimulate(bench_simulate, task, std::cout, std::cerr);
+  } else if (bench->got_subcommand("calibrate")) {
+    status = RunBenchCalibrate(bench_calibrate, task, std::cout, std::cerr);
   } else {
     status = RunBenchSolve(bench_solve, task, std::cout, std::cerr);
   }

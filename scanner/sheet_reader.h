@@ -38,8 +38,8 @@ struct Sheet {
   BlockGrid grid;
   std::vector<std::vector<SheetSample>> samples;  // [light][block that can be used, row by row]
   std::vector<std::vector<int>> blocks;           // [light]: which block each sample is
-  std::vector<FrameFault> faults;           // [light]: kNone, or why it has no samples
-  std::optional<Eigen::Vector3d> dark_rgb;  // mean radiance of the dark frames
+  std::vector<FrameFault> faults;                 // [light]: kNone, or why it has no samples
+  std::optional<Eigen::Vector3d> dark_rgb;        // mean radiance of the dark frames
   std::vector<std::string> warnings;
   std::map<std::string, std::string> sha256_of_input;
 };

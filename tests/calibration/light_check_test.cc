@@ -21,7 +21,7 @@ constexpr int kRows = 12;
 // The scanner of The Order: 1886 with a camera of `size`, and what it sees today.
 struct Today {
   Rig rig;  // as calibrated
-  std::vector<SheetView> sheets;
+  std::vector<CheckedSheet> sheets;
   std::vector<FrameFault> faults;
 };
 
@@ -310,7 +310,7 @@ TEST(LightCheck, AFewBlindPixelsSayThatTheyAreUnclear) {
 TEST(LightCheck, ErrorsSayWhatToDo) {
   const Rig rig = CalibratedRig();
   const Today today = See(rig, rig, 1, 21);
-  const auto message = [&](const Rig& with, const std::vector<SheetView>& sheets,
+  const auto message = [&](const Rig& with, const std::vector<CheckedSheet>& sheets,
                            const LightCheckOptions& options) {
     return CheckRig(with, sheets, today.faults, options).error().message;
   };
@@ -324,7 +324,7 @@ TEST(LightCheck, ErrorsSayWhatToDo) {
   EXPECT_THAT(message(rig, today.sheets, {.albedo = 0.0}), HasSubstr("albedo = 0; need 0 <"));
   EXPECT_THAT(message(rig, today.sheets, {.max_flux_percent = 100.0}),
               HasSubstr("max_flux_percent = 100; need 0 < max_flux_percent < 100"));
-  std::vector<SheetView> empty = today.sheets;
+  std::vector<CheckedSheet> empty = today.sheets;
   for (std::vector<SheetSample>& samples : empty[0].samples) {
     samples.clear();
   }
