@@ -6,6 +6,7 @@
 #include <set>
 
 #include "core/json.h"
+#include "rig/light_json.h"
 
 namespace sateen {
 namespace {
@@ -15,14 +16,6 @@ using Json = nlohmann::json;
 // Below this a vector or rotation is exact but for rounding and stays as it is, so that reading
 // what was written changes no bit.
 constexpr double kRounding = 1e-14;
-
-Eigen::Vector3d Vector3(const std::vector<double>& numbers) {
-  return Eigen::Map<const Eigen::Vector3d>(numbers.data());
-}
-
-Eigen::Vector3d Unit(const Eigen::Vector3d& v) {
-  return std::abs(v.norm() - 1.0) > kRounding ? v.normalized() : v;
-}
 
 // The rotation nearest to one that a file has rounded.
 Eigen::Matrix3d NearestRotation(const Eigen::Matrix3d& r) {
@@ -75,60 +68,7 @@ Result<Response> ReadResponse(JsonReader reader) {
   return response;
 }
 
-LightModel ReadModel(JsonReader& reader) {
-  const std::string name = reader.String("model");
-  for (const LightModel model : {LightModel::kDistant, LightModel::kNear, LightModel::kLed}) {
-    if (name == Name(model)) {
-      return model;
-    }
-  }
-  reader.Require(false, "model",
-                 fmt::format("is \"{}\"; need \"distant\", \"near\" or \"led\"", name));
-  return LightModel::kDistant;
-}
-
-// Frames are named after their lights.
-bool IsFileName(const std::string& name) {
-  return !name.empty() && name != "." && name != ".." &&
-         std::none_of(name.begin(), name.end(),
-                      [](unsigned char c) { return c == '/' || c < 0x20 || c == 0x7f; });
-}
-
-Result<Light> ReadLight(JsonReader reader, const std::string& what) {
-  Light light;
-  light.name = reader.String("name");
-  reader.Require(IsFileName(light.name), "name",
-                 fmt::format("is \"{}\"; need a name that a frame's file can have, without / and "
-                             "control characters",
-                             light.name));
-  light.channel = reader.Integer("channel");
-  light.model = ReadModel(reader);
-  reader.Require(!reader.Has("field"), "field",
-                 "is of the rung \"led + field\", which this version cannot use; calibrate the "
-                 "lights with this version, or use the version that wrote the file");
-  if (light.model == LightModel::kDistant) {
-    light.direction = Vector3(reader.Numbers("direction", 3));
-    reader.Require(light.direction.z() > 0.0, "direction",
-                   fmt::format("has z = {}; need z > 0, above the table", light.direction.z()));
-  } else {
-    light.position_mm = Vector3(reader.Numbers("position_mm", 3));
-  }
-  if (light.model == LightModel::kLed) {
-    light.axis = Vector3(reader.Numbers("axis", 3));
-    light.anisotropy = reader.Number("anisotropy");
-  }
-  light.flux_rgb = Vector3(reader.Numbers("flux_rgb", 3));
-  if (Status status = reader.Finish().and_then([&] { return light.Validate(what); }); !status) {
-    return tl::unexpected(status.error());
-  }
-  light.direction = Unit(light.direction);
-  light.axis = Unit(light.axis);
-  return light;
-}
-
-Json ToJson(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
-
-nlohmann::ordered_json ToJson(const Camera& camera) {
+nlohmann::ordered_json CameraToJson(const Camera& camera) {
   const Eigen::Matrix<double, 4, 4, Eigen::RowMajor> pose = camera.table_from_camera.matrix();
   return {{"model", camera.model},
           {"size_px", {camera.size_px.width, camera.size_px.height}},
@@ -137,7 +77,7 @@ nlohmann::ordered_json ToJson(const Camera& camera) {
           {"table_from_camera", std::vector<double>(pose.data(), pose.data() + pose.size())}};
 }
 
-nlohmann::ordered_json ToJson(const Response& response) {
+nlohmann::ordered_json ResponseToJson(const Response& response) {
   nlohmann::ordered_json json = {{"black", response.black},
                                  {"white", response.white},
                                  {"white_balance", ToJson(response.white_balance)}};
@@ -147,22 +87,6 @@ nlohmann::ordered_json ToJson(const Response& response) {
   if (response.gain_dn_per_electron) {
     json["gain_dn_per_electron"] = *response.gain_dn_per_electron;
   }
-  return json;
-}
-
-nlohmann::ordered_json ToJson(const Light& light) {
-  nlohmann::ordered_json json = {
-      {"name", light.name}, {"channel", light.channel}, {"model", Name(light.model)}};
-  if (light.model == LightModel::kDistant) {
-    json["direction"] = ToJson(light.direction);
-  } else {
-    json["position_mm"] = ToJson(light.position_mm);
-  }
-  if (light.model == LightModel::kLed) {
-    json["axis"] = ToJson(light.axis);
-    json["anisotropy"] = light.anisotropy;
-  }
-  json["flux_rgb"] = ToJson(light.flux_rgb);
   return json;
 }
 
@@ -286,10 +210,10 @@ Result<Rig> ReadRig(const std::filesystem::path& path) {
 std::string RigToJson(const Rig& rig) {
   std::vector<std::string> members = {R"(  "schema": "sateen.rig/1")"};
   if (rig.camera) {
-    members.push_back("  \"camera\": " + Line(ToJson(*rig.camera)));
+    members.push_back("  \"camera\": " + Line(CameraToJson(*rig.camera)));
   }
   if (rig.response) {
-    members.push_back("  \"response\": " + Line(ToJson(*rig.response)));
+    members.push_back("  \"response\": " + Line(ResponseToJson(*rig.response)));
   }
   std::vector<std::string> lights;
   for (const Light& light : rig.lights) {

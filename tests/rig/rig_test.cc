@@ -32,7 +32,12 @@ Json FullRig() {
       {"name": "b", "channel": 5, "model": "near", "position_mm": [100, -20, 350.5],
        "flux_rgb": [1, 2, 3]},
       {"name": "c", "channel": 2, "model": "led", "position_mm": [100, 20, 350],
-       "axis": [0, -0.6, -0.8], "anisotropy": 0.7, "flux_rgb": [1, 2, 3]}],
+       "axis": [0, -0.6, -0.8], "anisotropy": 0.7, "flux_rgb": [1, 2, 3]},
+      {"name": "d", "channel": 3, "model": "led+field", "position_mm": [-100, 20, 350],
+       "axis": [0, 0.6, -0.8], "anisotropy": 0.5, "flux_rgb": [1, 2, 3],
+       "field": {"origin_mm": [-90, -60.5], "spacing_mm": 45, "columns": 5, "rows": 4,
+                 "gain": [1, 1.01, 1.02, 1.03, 1.04, 1, 1, 1, 1, 1, 0.9, 0.9, 0.9, 0.9, 0.9,
+                          1, 1, 1, 1, 0.3333333333333333]}}],
     "calibration": {"date": "2025-01-31", "figures": {"held_out": [0.01, {"x": null}]}}})");
 }
 
@@ -89,7 +94,7 @@ TEST(ReadRig, ReadsEveryKey) {
 
 TEST(ReadRig, ReadsALightOfEachModel) {
   const Lights lights = Read(FullRig().dump()).value().lights;
-  ASSERT_EQ(lights.size(), 3U);
+  ASSERT_EQ(lights.size(), 4U);
   EXPECT_EQ(lights[0].name, "a");
   EXPECT_EQ(lights[0].model, LightModel::kDistant);
   EXPECT_EQ(lights[0].direction, Eigen::Vector3d(0.6, 0, 0.8));
@@ -100,6 +105,13 @@ TEST(ReadRig, ReadsALightOfEachModel) {
   EXPECT_EQ(lights[2].model, LightModel::kLed);
   EXPECT_EQ(lights[2].axis, Eigen::Vector3d(0, -0.6, -0.8));
   EXPECT_EQ(lights[2].anisotropy, 0.7);
+  EXPECT_EQ(lights[3].model, LightModel::kLedField);
+  EXPECT_EQ(lights[3].field.origin_mm, Eigen::Vector2d(-90, -60.5));
+  EXPECT_EQ(lights[3].field.spacing_mm, 45);
+  EXPECT_EQ(lights[3].field.columns, 5);
+  EXPECT_EQ(lights[3].field.rows, 4);
+  EXPECT_EQ(lights[3].field.gain[4], 1.04);
+  EXPECT_EQ(lights[3].field.gain[10], 0.9);
 }
 
 TEST(RigToJson, RoundTripsToTheLastBit) {
@@ -162,13 +174,18 @@ TEST(ReadRig, OnlyTheKeysOfTheModelAreAllowed) {
   EXPECT_THAT(MessageWith("/lights/1/axis", {0, 0, -1}), HasSubstr("lights[1].axis is not known"));
   EXPECT_THAT(MessageWith("/lights/2/direction", {0, 0, 1}), HasSubstr("lights[2].direction is"));
   EXPECT_THAT(MessageWith("/lights/0/model", "spot"),
-              HasSubstr("lights[0].model is \"spot\"; need \"distant\", \"near\" or \"led\""));
+              HasSubstr("lights[0].model is \"spot\"; need \"distant\", \"near\", \"led\" or "
+                        "\"led+field\""));
 }
 
-TEST(ReadRig, FieldIsRefusedAndNotIgnored) {
+TEST(ReadRig, AFieldIsOfItsModelAloneAndChecked) {
   EXPECT_THAT(MessageWith("/lights/2/field", {{"grid", {1, 1}}}),
-              StartsWith("rig.json: lights[2].field is of the rung \"led + field\", which this "
-                         "version cannot use;"));
+              StartsWith("rig.json: lights[2].field"));  // not of the light's model
+  EXPECT_THAT(MessageWith("/lights/3/field/spacing_mm", -1), HasSubstr("spacing_mm is -1; need"));
+  EXPECT_THAT(MessageWith("/lights/3/field/columns", 2000000000), HasSubstr("lights[3].field"));
+  EXPECT_THAT(MessageWith("/lights/3/field/gain/7", 0), HasSubstr("a gain is 0; need above 0"));
+  EXPECT_THAT(MessageWith("/lights/3/field/unit", "mm"), HasSubstr("lights[3].field.unit"));
+  EXPECT_THAT(MessageWithout("/lights/3/field"), HasSubstr("lights[3].field"));
 }
 
 TEST(ReadRig, UnknownKeysAreErrorsAtEveryLevel) {
