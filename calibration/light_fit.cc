@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "calibration/field_fit.h"
 #include "calibration/light_residuals.h"
 #include "calibration/robust_fit.h"
 
@@ -18,7 +19,7 @@ constexpr double kStartAnisotropy = 1.0;
 // A rough light on a higher rung than it has: an LED that faces the middle of the samples.
 Light OnRung(const Light& rough, LightModel model, const std::vector<SheetSample>& samples) {
   Light light = rough;
-  if (model == LightModel::kLed && rough.model != LightModel::kLed) {
+  if (IsLed(model) && !IsLed(rough.model)) {
     Eigen::Vector3d middle = Eigen::Vector3d::Zero();
     for (const SheetSample& sample : samples) {
       middle += sample.point_mm / static_cast<double>(samples.size());
@@ -26,7 +27,7 @@ Light OnRung(const Light& rough, LightModel model, const std::vector<SheetSample
     light.axis = (middle - rough.position_mm).normalized();
     light.anisotropy = kStartAnisotropy;
   }
-  light.model = model;
+  light.model = std::min(model, LightModel::kLed);
   return light;
 }
 
@@ -74,6 +75,15 @@ Status CheckSamples(const std::vector<SheetSample>& samples) {
                   : Status();
 }
 
+// Where the fit of a rung starts: from the rung below; the field from the ruler again, because an LED that
+// fits badly may have gone far astray.
+Light StartOf(LightModel model, const Light& below, const Light& rough,
+              const std::vector<SheetSample>& samples, double albedo) {
+  Light from = OnRung(model == LightModel::kLedField ? rough : below, model, samples);
+  ScaleFlux(samples, albedo, from);
+  return from;
+}
+
 // The samples' indices, and which of them judge the rungs.
 struct Split {
   std::vector<size_t> all;
@@ -88,34 +98,68 @@ struct Split {
   }
 };
 
+// A rung and what fitting it robustly came to.
+struct Fitted {
+  RobustFit fit;
+  double roughness_weight = 0.0;
+};
+
+// Fits any rung to samples of these indices; the field's roughness by `held_out`, where there are any.
+Result<Fitted> FitRung(const LightResiduals& residuals, LightModel model, const Light& start,
+                       const std::vector<size_t>& indices, const std::vector<size_t>& held_out,
+                       double roughness_weight, const LightFitOptions& options) {
+  if (model != LightModel::kLedField) {
+    Result<RobustFit> fit = FitRobustly(residuals, model, start, indices, held_out.empty());
+    if (!fit) {
+      return tl::unexpected(fit.error());
+    }
+    return Fitted{.fit = *std::move(fit)};
+  }
+  Light led = start;
+  led.model = LightModel::kLed;
+  Result<FieldFit> field = FitField(residuals.Samples(), led, indices, held_out, roughness_weight,
+                                    {.albedo = options.albedo});
+  if (!field) {
+    return tl::unexpected(field.error());
+  }
+  return Fitted{.fit = {.light = std::move(field->light),
+                        .used = std::move(field->used),
+                        .iterations = field->iterations,
+                        .covariance = std::move(field->covariance)},
+                .roughness_weight = field->roughness_weight};
+}
+
 // One rung fitted to all samples but the held-out ones, and judged by those.
 Result<RungFit> TryRung(const LightResiduals& residuals, LightModel model, const Light& start,
-                        const Split& split, double& noise_rms) {
-  Result<RobustFit> fit = FitRobustly(residuals, model, start, split.fitted, false);
-  if (!fit) {
-    return tl::unexpected(fit.error());
+                        const Split& split, const LightFitOptions& options, double& noise_rms) {
+  Result<Fitted> fitted =
+      FitRung(residuals, model, start, split.fitted, split.held_out, 1.0, options);
+  if (!fitted) {
+    return tl::unexpected(fitted.error());
   }
-  noise_rms = residuals.NoiseRms(fit->light, split.all);
-  const std::vector<double> off = residuals.Of(fit->light, split.held_out);
+  const RobustFit& fit = fitted->fit;
+  noise_rms = residuals.NoiseRms(fit.light, split.all);
+  const std::vector<double> off = residuals.Of(fit.light, split.held_out);
   const std::vector<size_t> on_model =
       OnModel(split.held_out, off, std::max(SpreadOf(off), noise_rms));
-  return RungFit{.light = fit->light,
-                 .residual_rms = Rms(residuals.Of(fit->light, fit->used)),
-                 .held_out_rms = Rms(residuals.Of(fit->light, on_model)),
-                 .iterations = fit->iterations};
+  return RungFit{.light = fit.light,
+                 .residual_rms = Rms(residuals.Of(fit.light, fit.used)),
+                 .held_out_rms = Rms(residuals.Of(fit.light, on_model)),
+                 .iterations = fit.iterations,
+                 .roughness_weight = fitted->roughness_weight};
 }
 
 // Climbs the rungs until one explains the held-out samples; returns which did best.
-Result<size_t> Climb(const LightResiduals& residuals, const Split& split, Light start,
+Result<size_t> Climb(const LightResiduals& residuals, const Split& split, const Light& rough,
                      const LightFitOptions& options, LightFit& result) {
+  Light start = rough;
   size_t chosen = 0;
-  for (const LightModel model : {LightModel::kNear, LightModel::kLed}) {
+  for (const LightModel model : {LightModel::kNear, LightModel::kLed, LightModel::kLedField}) {
     if (model > options.highest_rung) {
       break;
     }
-    Light from = OnRung(start, model, residuals.Samples());
-    ScaleFlux(residuals.Samples(), options.albedo, from);
-    Result<RungFit> rung = TryRung(residuals, model, from, split, result.noise_rms);
+    const Light from = StartOf(model, start, rough, residuals.Samples(), options.albedo);
+    Result<RungFit> rung = TryRung(residuals, model, from, split, options, result.noise_rms);
     if (!rung && result.rungs.empty()) {
       return tl::unexpected(rung.error());
     }
@@ -135,12 +179,17 @@ Result<size_t> Climb(const LightResiduals& residuals, const Split& split, Light 
 }
 
 // The chosen rung fitted to all samples, with what is uncertain of it.
-Status FitToAll(const LightResiduals& residuals, const Light& start, const std::vector<size_t>& all,
-                LightFit& result) {
-  Result<RobustFit> fit = FitRobustly(residuals, start.model, start, all, true);
-  if (!fit) {
-    return tl::unexpected(fit.error());
+Status FitToAll(const LightResiduals& residuals, const RungFit& best, const Light& rough,
+                const std::vector<size_t>& all, const LightFitOptions& options, LightFit& result) {
+  const LightModel model = best.light.model;
+  const Light from = model == LightModel::kLedField
+                         ? StartOf(model, rough, rough, residuals.Samples(), options.albedo)
+                         : best.light;
+  Result<Fitted> fitted = FitRung(residuals, model, from, all, {}, best.roughness_weight, options);
+  if (!fitted) {
+    return tl::unexpected(fitted.error());
   }
+  const RobustFit* fit = &fitted->fit;
   result.light = fit->light;
   result.used = fit->used.size();
   result.left_out = all.size() - fit->used.size();
@@ -174,14 +223,12 @@ Result<LightFit> FitLight(const std::vector<SheetSample>& samples, const Light& 
   const Split split(samples.size());
   const LightResiduals residuals(samples, options.albedo);
   LightFit result;
-  Light start = rough;
-  ScaleFlux(samples, options.albedo, start);
-  const Result<size_t> chosen = Climb(residuals, split, start, options, result);
+  const Result<size_t> chosen = Climb(residuals, split, rough, options, result);
   if (!chosen) {
     return tl::unexpected(chosen.error());
   }
-  const Light best = result.rungs[*chosen].light;
-  if (Status status = FitToAll(residuals, best, split.all, result); !status) {
+  const RungFit best = result.rungs[*chosen];
+  if (Status status = FitToAll(residuals, best, rough, split.all, options, result); !status) {
     return tl::unexpected(status.error());
   }
   return result;

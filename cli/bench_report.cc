@@ -26,8 +26,12 @@ struct Style {
   std::string_view color;
 };
 
-constexpr std::array<Style, 4> kCases = {
-    {{"clean", "#1b7837"}, {"noisy", "#2166ac"}, {"hard", "#b2182b"}, {"subnormal", "#762a83"}}};
+constexpr std::array<Style, 6> kCases = {{{"clean", "#1b7837"},
+                                          {"noisy", "#2166ac"},
+                                          {"hard", "#b2182b"},
+                                          {"led", "#bf812d"},
+                                          {"led+field", "#01665e"},
+                                          {"subnormal", "#762a83"}}};
 
 std::string ColorOf(std::string_view case_name) {
   const auto* found = std::find_if(kCases.begin(), kCases.end(),

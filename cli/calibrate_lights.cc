@@ -28,6 +28,15 @@ constexpr int kResidualPanelPx = 240;
 constexpr int kResidualColumns = 5;
 constexpr float kPercent = 100.0F;
 
+LightModel HighestRung(std::string_view name) {
+  for (const LightModel model : {LightModel::kNear, LightModel::kLed}) {
+    if (name == Name(model)) {
+      return model;
+    }
+  }
+  return LightModel::kLedField;
+}
+
 class LightsCalibrator {
  public:
   LightsCalibrator(const CalibrateLightsArgs& args, const Task& task) : args_(args), task_(task) {}
@@ -120,9 +129,8 @@ class LightsCalibrator {
   }
 
   Status FitAll() {
-    const LightFitOptions options{
-        .albedo = args_.albedo,
-        .highest_rung = args_.highest_rung == "near" ? LightModel::kNear : LightModel::kLed};
+    const LightFitOptions options{.albedo = args_.albedo,
+                                  .highest_rung = HighestRung(args_.highest_rung)};
     const size_t count = result_.rig.lights.size();
     std::vector<Result<LightFit>> fits(count);
     task_.BeginStage("fitting lights", static_cast<int>(count));
@@ -319,8 +327,9 @@ void AddCalibrateLights(CLI::App& calibrate, CalibrateLightsArgs& args) {
       ->needs(border);
   cmd->add_option("--rig", args.rough_rig,
                   "Rough rig: camera, and lights to within some 50 mm; the session's own");
-  cmd->add_option("--model", args.highest_rung, "Highest rung of the model ladder: near or led")
-      ->check(CLI::IsMember({"near", "led"}))
+  cmd->add_option("--model", args.highest_rung,
+                  "Highest rung of the model ladder: near, led or led+field")
+      ->check(CLI::IsMember({"near", "led", "led+field"}))
       ->capture_default_str();
   cmd->add_option("--albedo", args.albedo, "Albedo of the paper, above 0 and up to 1")
       ->capture_default_str();

@@ -22,7 +22,7 @@ struct CalibrateLightsArgs {
   std::filesystem::path rough_rig;
   std::string border;       // what is printed on the sheets; empty: nothing
   bool find_poses = false;  // by the border, also where sessions record them
-  std::string highest_rung = "led";
+  std::string highest_rung = "led+field";
   double albedo = 0.99;
   int threads = 0;
   bool json = false;
