@@ -18,9 +18,10 @@ constexpr int kAdmissions = 3;        // of what lies within, after squares are 
 constexpr double kAsGood = 1.01;      // times the least held-out error
 constexpr double kWeightScale = 2.0;  // of the residuals' spread
 constexpr double kLeastGain = 1e-3;
+constexpr double kLeastVariance = 1e-24;
 constexpr double kConvergedMm = 1e-5;
-constexpr double kReferenceMm2 = 1e6;  // where flux is irradiance, squared
-constexpr double kLeastRoughness = 1.0;
+constexpr double kReferenceMm2 = 1e6;      // where flux is irradiance, squared
+constexpr double kLeastRoughness = 100.0;  // second differences of 0.1: rougher than any lens
 constexpr double kMostRoughness = 1e7;
 constexpr Eigen::Index kLightUnknowns = 6;  // position, log flux; then the gains
 
@@ -75,6 +76,12 @@ class FieldFitter {
     return residuals_.Of(light_, indices);
   }
 
+  // v of (2): from how neighbours differ, so that a model that is still wrong does not stiffen itself.
+  [[nodiscard]] double Variance(const std::vector<size_t>& indices) const {
+    const double noise = residuals_.NoiseRms(light_, indices);
+    return std::max(noise * noise, kLeastVariance);
+  }
+
   // Cauchy's weights, as wide as the residuals then are.
   void DescendWeighted(const std::vector<size_t>& indices, double roughness) {
     for (int round = 0; round < kWeightedRounds; ++round) {
@@ -87,7 +94,7 @@ class FieldFitter {
         weights[i] = 1.0 / (1.0 + squared / std::pow(kWeightScale * spread, 2));
       }
       Assemble(indices, r, weights);
-      Step(roughness, spread * spread);
+      Step(roughness, Variance(indices));
     }
   }
 
@@ -95,8 +102,7 @@ class FieldFitter {
     for (int step = 0; step < options_.most_iterations; ++step) {
       const std::vector<double> r = Residuals(indices);
       Assemble(indices, r, std::vector<double>(indices.size(), 1.0));
-      const double spread = SpreadOf(r);
-      if (Step(roughness, spread * spread) < kConvergedMm) {
+      if (Step(roughness, Variance(indices)) < kConvergedMm) {
         break;
       }
     }
@@ -107,13 +113,13 @@ class FieldFitter {
   [[nodiscard]] double BestRoughness(const std::vector<size_t>& indices,
                                      const std::vector<size_t>& held_out) {
     const std::vector<double> r = Residuals(indices);
-    const double spread = SpreadOf(r);
+    const double variance = Variance(indices);
     Assemble(indices, r, std::vector<double>(indices.size(), 1.0));
     const Light start = light_;
     std::vector<std::pair<double, double>> tried;
     double least = std::numeric_limits<double>::infinity();
     for (double roughness = kLeastRoughness; roughness <= kMostRoughness; roughness *= 10.0) {
-      Step(roughness, spread * spread);
+      Step(roughness, variance);
       const std::vector<double> off = Residuals(held_out);
       tried.emplace_back(roughness,
                          Rms(residuals_.Of(light_, OnModel(held_out, off, SpreadOf(off)))));
@@ -130,9 +136,8 @@ class FieldFitter {
   // Gives flux what it shares with the gain, and returns the covariance of position and log flux.
   Eigen::MatrixXd Normalise(const std::vector<size_t>& used, double roughness) {
     const std::vector<double> r = Residuals(used);
-    const double spread = SpreadOf(r);
     Assemble(used, r, std::vector<double>(used.size(), 1.0));
-    AddPenalty(roughness, spread * spread);
+    AddPenalty(roughness, Variance(used));
     Eigen::MatrixXd shares = Eigen::MatrixXd::Zero(size_, kLightUnknowns);
     shares.topRows(kLightUnknowns).setIdentity();
     double mean = 0.0;

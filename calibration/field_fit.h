@@ -38,7 +38,7 @@ struct FieldFit {
 ///                                 + |s - s_ruler|^2 / position_sd^2)                            (2)
 ///
 /// where E is what an LED of flux 1 gives a surface of the sheet's normal, M the number of gains and v
-/// the residuals' variance. Axis and fall-off stay as they are given: the field takes what is wrong with
+/// the noise's variance, from how neighbours differ. Axis and fall-off stay as they are given: the field takes what is wrong with
 /// them. Gauss and Newton's method, the gains being linear in (1); w are Cauchy's weights, closing in,
 /// then 1 within 4 robust standard deviations and 0 beyond. lambda is the largest of a row of powers of
 /// ten that explains `held_out` within 1 % of the best. At the end g is 1 in the mean over the samples:
@@ -58,7 +58,7 @@ struct FieldFit {
 [[nodiscard]] Result<FieldFit> FitField(const std::vector<SheetSample>& samples, const Light& ruler,
                                         const std::vector<size_t>& indices,
                                         const std::vector<size_t>& held_out,
-                                        double roughness_weight = 1.0,
+                                        double roughness_weight = 100.0,
                                         const FieldFitOptions& options = {});
 
 // E of (1), and its derivatives by the light's position.

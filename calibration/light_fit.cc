@@ -15,6 +15,7 @@ constexpr size_t kFewestSamples = 50;
 constexpr size_t kHeldOutEvery = 5;
 constexpr double kExplained = 1.1;  // times the noise
 constexpr double kStartAnisotropy = 1.0;
+constexpr double kStartRoughness = 100.0;  // of a field
 
 // A rough light on a higher rung than it has: an LED that faces the middle of the samples.
 Light OnRung(const Light& rough, LightModel model, const std::vector<SheetSample>& samples) {
@@ -133,7 +134,7 @@ Result<Fitted> FitRung(const LightResiduals& residuals, LightModel model, const 
 Result<RungFit> TryRung(const LightResiduals& residuals, LightModel model, const Light& start,
                         const Split& split, const LightFitOptions& options, double& noise_rms) {
   Result<Fitted> fitted =
-      FitRung(residuals, model, start, split.fitted, split.held_out, 1.0, options);
+      FitRung(residuals, model, start, split.fitted, split.held_out, kStartRoughness, options);
   if (!fitted) {
     return tl::unexpected(fitted.error());
   }
