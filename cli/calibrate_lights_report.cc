@@ -61,13 +61,14 @@ std::string WaysTable(const std::vector<WayFigures>& ways) {
   return text + "\n";
 }
 
-const RungFit& ChosenRung(const LightFit& fit) {
+// What each rung left of the held-out samples, in units of the noise: "near 75.1, led 1.01".
+std::string RungsOf(const LightFit& fit) {
+  std::vector<std::string> rungs;
   for (const RungFit& rung : fit.rungs) {
-    if (rung.light.model == fit.light.model) {
-      return rung;
-    }
+    rungs.push_back(
+        fmt::format("{} {:.3g}", Name(rung.light.model), rung.held_out_rms / fit.noise_rms));
   }
-  return fit.rungs.back();
+  return fmt::format("{}", fmt::join(rungs, ", "));
 }
 
 }  // namespace
@@ -96,18 +97,18 @@ std::string JsonReport(const CalibrateLightsArgs& args, const LightsCalibration&
 
 std::string TextReport(const CalibrateLightsArgs& args, const LightsCalibration& result) {
   std::string text = SheetsTable(result.sheets);
-  text += fmt::format("{:<10} {:<5} {:>9} {:>13} {:>14} {:>8} {:>15} {:>9}\n", "light", "model",
-                      "moved mm", "position +- mm", "direction +-", "flux +-", "misfit / noise",
-                      "left out");
+  text += fmt::format("{:<10} {:<9} {:>9} {:>14} {:>14} {:>8} {:>9}  {}\n", "light", "model",
+                      "moved mm", "position +- mm", "direction +-", "flux +-", "left out",
+                      "misfit / noise");
   bool has_truth = false;
   for (const LightFigures& figures : result.lights) {
     const LightFit& fit = figures.fit;
     text += fmt::format(
-        "{:<10} {:<5} {:>9.2f} {:>14.3f} {:>10.4f} deg {:>6.3f} % {:>15.2f} {:>7.1f} %\n",
-        fit.light.name, Name(fit.light.model), figures.moved_mm, fit.position_sd_mm.norm(),
+        "{:<10} {:<9} {:>9.2f} {:>14.3f} {:>10.4f} deg {:>6.3f} % {:>7.1f} %  {}\n", fit.light.name,
+        Name(fit.light.model), figures.moved_mm, fit.position_sd_mm.norm(),
         fit.direction_sd_rad / kRadPerDeg, 100.0 * fit.flux_sd.maxCoeff(),
-        ChosenRung(fit).held_out_rms / fit.noise_rms,
-        100.0 * static_cast<double>(fit.left_out) / static_cast<double>(fit.left_out + fit.used));
+        100.0 * static_cast<double>(fit.left_out) / static_cast<double>(fit.left_out + fit.used),
+        RungsOf(fit));
     has_truth = has_truth || figures.position_error_mm.has_value();
   }
   text += WaysTable(result.ways);
