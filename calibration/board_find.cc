@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "calibration/chessboard.h"
+#include "calibration/edge_width.h"
 #include "calibration/markers.h"
 #include "calibration/plane_map.h"
 
@@ -114,6 +115,7 @@ std::optional<PlaneMap> PatchAt(const std::vector<BoardMarker>& markers,
 // the sign that the colours of the squares say.
 BoardView CornersBeside(const Image<uint8_t>& grey, const BoardSpec& spec,
                         const std::vector<BoardMarker>& markers) {
+  const Image<uint8_t> smooth = SmoothedForCorners(grey);
   struct Candidate {
     int id;
     Eigen::Vector2d corner_px;
@@ -133,7 +135,7 @@ BoardView CornersBeside(const Image<uint8_t>& grey, const BoardSpec& spec,
         CrossingContrast(grey, *map, at_mm.head<2>(), reach_mm / kQuadrant);
     const Eigen::Vector2d rough = MapPoint(*map, at_mm.head<2>());
     const int window_px = CornerWindowPx(*map, at_mm.head<2>(), reach_mm);
-    const Eigen::Vector2d corner = RefineCorner(grey, rough, window_px);
+    const Eigen::Vector2d corner = RefineCorner(smooth, rough, window_px);
     if (crossing && corner != rough && (corner - rough).norm() <= window_px) {
       const bool dark_first = spec.IsBlack(id % (spec.columns - 1), id / (spec.columns - 1));
       candidates.push_back({id, corner, dark_first ? *crossing : -*crossing});
@@ -164,10 +166,11 @@ Result<BoardView> FindCharuco(const Image<uint8_t>& grey, const BoardSpec& spec)
   }
   const std::vector<BoardMarker> markers = InPlace(BoardMarkersOf(seen, spec), spec.square_mm);
   if (static_cast<double>(markers.size()) < kFewestInPlace * static_cast<double>(seen.size())) {
-    return Fail(ErrorCode::kDegenerate,
-                "{} of {} markers lie where '{}' has them; it is another board, an older pattern "
-                "(':legacy'), or two boards are in view",
-                markers.size(), seen.size(), spec.Text());
+    return Fail(
+        ErrorCode::kDegenerate,
+        "{} of {} markers lie where '{}' has them; it is another board, or of the other pattern "
+        "(with ':legacy' or without), or two boards are in view",
+        markers.size(), seen.size(), spec.Text());
   }
   BoardView view = CornersBeside(grey, spec, markers);
   if (view.ids.size() < kFewestCorners || !FitPlaneMap(view.points_mm, view.corners_px)) {
@@ -181,8 +184,12 @@ Result<BoardView> FindCharuco(const Image<uint8_t>& grey, const BoardSpec& spec)
 }  // namespace
 
 Result<BoardView> FindBoard(const Image<uint8_t>& grey, const BoardSpec& spec) {
-  return spec.pattern == BoardPattern::kChessboard ? FindChessboard(grey, spec)
-                                                   : FindCharuco(grey, spec);
+  Result<BoardView> view = spec.pattern == BoardPattern::kChessboard ? FindChessboard(grey, spec)
+                                                                     : FindCharuco(grey, spec);
+  if (view) {
+    view->edge_px = EdgeWidthPx(grey, spec, *view);
+  }
+  return view;
 }
 
 }  // namespace sateen

@@ -26,8 +26,8 @@ std::vector<Eigen::Vector2d> RoughCorners(const Image<uint8_t>& grey, const Boar
   }
   const cv::Size size(spec.columns - 1, spec.rows - 1);
   std::vector<cv::Point2f> found;
-  if (!cv::findChessboardCorners(small, size, found,
-                                 cv::CALIB_CB_NORMALIZE_IMAGE | cv::CALIB_CB_ADAPTIVE_THRESH) &&
+  // The older findChessboardCorners() takes up to 15 s where the board is not there.
+  if (!cv::findChessboardCornersSB(small, size, found, cv::CALIB_CB_NORMALIZE_IMAGE) &&
       !cv::findChessboardCornersSB(small, size, found,
                                    cv::CALIB_CB_NORMALIZE_IMAGE | cv::CALIB_CB_EXHAUSTIVE)) {
     return {};
@@ -114,10 +114,11 @@ Result<BoardView> FindChessboard(const Image<uint8_t>& grey, const BoardSpec& sp
                 "the chessboard has more than {} x {} inner corners; correct the numbers",
                 spec.columns - 1, spec.rows - 1);
   }
+  const Image<uint8_t> smooth = SmoothedForCorners(grey);
   for (size_t i = 0; i < corners.size(); ++i) {
     const int window_px =
         CornerWindowPx(*map, view.points_mm[i].head<2>(), kCornerReach * spec.square_mm);
-    view.corners_px[i] = RefineCorner(grey, corners[i], window_px);
+    view.corners_px[i] = RefineCorner(smooth, corners[i], window_px);
   }
   return view;
 }

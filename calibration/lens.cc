@@ -156,7 +156,9 @@ ViewSet UsableViews(const std::vector<BoardView>& views, LensFit& report) {
   report.views.reserve(views.size());
   for (size_t i = 0; i < views.size(); ++i) {
     const BoardView& view = views[i];
-    report.views.push_back({.name = view.name.empty() ? fmt::format("view {}", i + 1) : view.name});
+    report.views.push_back({.name = view.name.empty() ? fmt::format("view {}", i + 1) : view.name,
+                            .corners = view.ids.size(),
+                            .edge_px = view.edge_px});
     if (view.ids.size() < kFewestCornersOfView || !FitPlaneMap(view.points_mm, view.corners_px)) {
       report.views.back().left_out = fmt::format("{} corners; need {} in more than one row",
                                                  view.ids.size(), kFewestCornersOfView);

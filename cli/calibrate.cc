@@ -5,8 +5,11 @@
 namespace sateen::cli {
 
 void AddCalibrate(CLI::App& app, CalibrateArgs& args) {
-  CLI::App* calibrate = app.add_subcommand("calibrate", "Measure the rig: its lights");
+  CLI::App* calibrate =
+      app.add_subcommand("calibrate", "Measure the rig: its lens, pose, response and lights");
   calibrate->require_subcommand(1);
+  AddCalibrateLens(*calibrate, args.lens);
+  AddCalibratePose(*calibrate, args.pose);
   AddCalibrateLights(*calibrate, args.lights);
   AddCalibrateSpheres(*calibrate, args.spheres);
   AddCalibrateCheck(*calibrate, args.check);
@@ -21,6 +24,12 @@ int RunCalibrate(const CLI::App& app, const CalibrateArgs& args, const Task& tas
   }
   if (name == "check") {
     return RunCalibrateCheck(args.check, task, out, log);
+  }
+  if (name == "lens") {
+    return RunCalibrateLens(args.lens, task, out, log);
+  }
+  if (name == "pose") {
+    return RunCalibratePose(args.pose, task, out, log);
   }
   SATEEN_CHECK(name == "lights");
   return RunCalibrateLights(args.lights, task, out, log);

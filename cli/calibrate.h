@@ -4,7 +4,9 @@
 #include <iosfwd>
 
 #include "cli/calibrate_check.h"
+#include "cli/calibrate_lens.h"
 #include "cli/calibrate_lights.h"
+#include "cli/calibrate_pose.h"
 #include "cli/calibrate_spheres.h"
 #include "core/task.h"
 
@@ -12,6 +14,8 @@ namespace sateen::cli {
 
 // What the subcommands of `sateen calibrate` are given; one of them runs.
 struct CalibrateArgs {
+  CalibrateLensArgs lens;
+  CalibratePoseArgs pose;
   CalibrateLightsArgs lights;
   CalibrateSpheresArgs spheres;
   CalibrateCheckArgs check;

@@ -32,6 +32,26 @@ void RecordCalibration(Rig& rig, std::string_view kind, nlohmann::json figures,
   rig.calibration_json = all.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 
+Result<Rig> RigToBeginWith(const std::filesystem::path& rig_file,
+                           const std::filesystem::path& output) {
+  const std::filesystem::path& path = rig_file.empty() ? output : rig_file;
+  std::error_code error;
+  if (rig_file.empty() && !std::filesystem::exists(output, error)) {
+    return Rig();
+  }
+  return ReadRig(path);
+}
+
+nlohmann::json RecordedFigure(const Rig& rig, const std::string& kind, const std::string& figure) {
+  const nlohmann::json all =
+      nlohmann::json::parse(rig.calibration_json, nullptr, /*allow_exceptions=*/false);
+  const auto of_kind = all.is_object() ? all.find(kind) : all.end();
+  if (!all.is_object() || of_kind == all.end() || !of_kind->is_object()) {
+    return nullptr;
+  }
+  return of_kind->value(figure, nlohmann::json(nullptr));
+}
+
 Result<std::filesystem::path> ReplaceFile(const std::filesystem::path& path,
                                           const std::string& text) {
   std::filesystem::path former;

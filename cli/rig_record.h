@@ -16,6 +16,15 @@ namespace sateen::cli {
 void RecordCalibration(Rig& rig, std::string_view kind, nlohmann::json figures,
                        const std::map<std::string, std::string>& sha256_of_input);
 
+// The rig that a calibration adds to: `rig_file` or, where that is empty, what is at `output`
+// already; without either a rig of nothing.
+[[nodiscard]] Result<Rig> RigToBeginWith(const std::filesystem::path& rig_file,
+                                         const std::filesystem::path& output);
+
+// One value of what RecordCalibration() recorded; null where there is none.
+[[nodiscard]] nlohmann::json RecordedFigure(const Rig& rig, const std::string& kind,
+                                            const std::string& figure);
+
 // Writes the file whole. One that is there already is first kept as a copy with the date and time in
 // its name, which is returned; empty where there was none.
 [[nodiscard]] Result<std::filesystem::path> ReplaceFile(const std::filesystem::path& path,

@@ -10,6 +10,7 @@
 #include "cli/maps.h"
 #include "cli/solve_report.h"
 #include "core/output_folder.h"
+#include "solver/undistort.h"
 
 namespace sateen::cli {
 namespace {
@@ -115,6 +116,12 @@ Status CheckSupported(const SolveArgs& args, Capture& capture) {
                 "or Normal_gt.mat",
                 args.capture.string());
   }
+  if (args.undistort && !capture.rig.camera) {
+    return Fail(ErrorCode::kBadData,
+                "{}: --undistort needs the lens, and the rig has no camera; run sateen calibrate "
+                "lens, or name a rig that has one with --rig",
+                args.capture.string());
+  }
   std::error_code ignored;  // a folder that does not exist yet is no other folder
   if (std::filesystem::equivalent(args.capture, args.output, ignored)) {
     return Fail(ErrorCode::kInvalidArgument,
@@ -127,6 +134,50 @@ Status CheckSupported(const SolveArgs& args, Capture& capture) {
         "lights' flux_rgb");
   }
   return {};
+}
+
+// What becomes maps; `outcome` stays in the camera's own pixels.
+struct MapsToWrite {
+  NormalField field;
+  LightFrame first_frame;  // in the overview
+  std::optional<Image<float>> error_deg;
+};
+
+// Takes the lens's distortion out of everything that becomes a map.
+Status UndistortMaps(const Camera& camera, const Task& task, MapsToWrite& maps) {
+  Result<NormalField> field = Undistorted(maps.field, camera, task);
+  if (!field) {
+    return tl::unexpected(field.error());
+  }
+  maps.field = *std::move(field);
+  std::vector<Image<float>*> planes;
+  for (Image<float>& plane : maps.first_frame.rgb.planes) {
+    planes.push_back(&plane);
+  }
+  if (maps.error_deg) {
+    planes.push_back(&*maps.error_deg);
+  }
+  for (Image<float>* plane : planes) {
+    Result<Image<float>> undistorted = Undistorted(*plane, camera, task);
+    if (!undistorted) {
+      return tl::unexpected(undistorted.error());
+    }
+    *plane = *std::move(undistorted);
+  }
+  return {};
+}
+
+Status StageAll(const SolveArgs& args, const SolveOutcome& outcome,
+                const std::optional<Image<float>>& error_deg, const Task& task,
+                OutputFolder& folder) {
+  const MapsOptions options{.normal_y_down = args.normal_y == "down"};
+  if (!args.undistort) {
+    return StageMaps(outcome.field, outcome.capture.stack.front(), error_deg, options, folder);
+  }
+  MapsToWrite maps{outcome.field, outcome.capture.stack.front(), error_deg};
+  return UndistortMaps(*outcome.capture.rig.camera, task, maps).and_then([&] {
+    return StageMaps(maps.field, maps.first_frame, maps.error_deg, options, folder);
+  });
 }
 
 // Reads, solves, compares and writes. Nothing is left behind where any of it fails.
@@ -165,8 +216,7 @@ Result<SolveOutcome> SolveCapture(const SolveArgs& args, const Task& task, std::
   std::optional<Image<float>> error_map_deg;
   Status status = Evaluate(outcome, error_map_deg);
   if (status) {
-    status = StageMaps(outcome.field, outcome.capture.stack.front(), error_map_deg,
-                       {.normal_y_down = args.normal_y == "down"}, *folder);
+    status = StageAll(args, outcome, error_map_deg, task, *folder);
   }
   if (status) {
     status = task.CheckCancelled();
@@ -240,6 +290,8 @@ void AddSolve(CLI::App& root, SolveArgs& args) {
                   "Normal maps with y up (OpenGL, glTF) or down (DirectX)")
       ->check(CLI::IsMember({"up", "down"}))
       ->capture_default_str();
+  cmd->add_flag("--undistort", args.undistort,
+                "Write the maps as a camera without the lens's distortion would have them");
   cmd->add_option("--encoding", args.encoding,
                   "What integer files hold; auto: 8 bits are sRGB, 16 bits are linear")
       ->check(CLI::IsMember({"auto", "linear", "srgb"}))

@@ -28,6 +28,7 @@ struct SolveArgs {
   int threads = 0;
   // Largest mean angular error from truth that passes, in (0, 180]; the capture must have truth.
   std::optional<double> fail_above_deg;
+  bool undistort = false;  // maps as the ideal pinhole camera would have them
   bool json = false;
 };
 

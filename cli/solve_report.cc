@@ -22,6 +22,7 @@ nlohmann::json OptionsToJson(const SolveArgs& args) {
           {"dark_level", args.solver.dark_level},
           {"max_condition", args.solver.max_condition},
           {"normal_y", args.normal_y},
+          {"undistort", args.undistort},
           {"encoding", args.encoding}};
 }
 
@@ -85,6 +86,11 @@ std::string JsonReport(const SolveArgs& args, const SolveOutcome& outcome) {
   }
   if (outcome.albedo_error) {
     report["albedo_error"] = ToJson(*outcome.albedo_error);
+  }
+  if (args.undistort) {
+    const Camera& camera = *outcome.capture.rig.camera;
+    report["map_camera"] = {{"k", {camera.fx, camera.fy, camera.cx, camera.cy}},
+                            {"distortion", {0, 0, 0, 0, 0}}};
   }
   if (args.fail_above_deg) {
     report["fail_above_deg"] = *args.fail_above_deg;

@@ -36,7 +36,7 @@ Result<Camera> ReadCamera(JsonReader reader, const std::string& what) {
   }
   const std::vector<double> k = reader.Numbers("k", 4);
   const std::vector<double> distortion = reader.Numbers("distortion", 5);
-  const std::vector<double> pose = reader.Numbers("table_from_camera", 16);
+  const std::optional<std::vector<double>> pose = reader.OptionalNumbers("table_from_camera", 16);
   if (Status status = reader.Finish(); !status) {
     return tl::unexpected(status.error());
   }
@@ -46,8 +46,11 @@ Result<Camera> ReadCamera(JsonReader reader, const std::string& what) {
   camera.cx = k[2];
   camera.cy = k[3];
   std::copy(distortion.begin(), distortion.end(), camera.distortion.begin());
-  camera.table_from_camera.matrix() =
-      Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(pose.data());
+  camera.has_pose = pose.has_value();
+  if (pose) {
+    camera.table_from_camera.matrix() =
+        Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(pose->data());
+  }
   if (Status status = camera.Validate(what); !status) {
     return tl::unexpected(status.error());
   }
@@ -70,11 +73,14 @@ Result<Response> ReadResponse(JsonReader reader) {
 
 nlohmann::ordered_json CameraToJson(const Camera& camera) {
   const Eigen::Matrix<double, 4, 4, Eigen::RowMajor> pose = camera.table_from_camera.matrix();
-  return {{"model", camera.model},
-          {"size_px", {camera.size_px.width, camera.size_px.height}},
-          {"k", {camera.fx, camera.fy, camera.cx, camera.cy}},
-          {"distortion", camera.distortion},
-          {"table_from_camera", std::vector<double>(pose.data(), pose.data() + pose.size())}};
+  nlohmann::ordered_json json = {{"model", camera.model},
+                                 {"size_px", {camera.size_px.width, camera.size_px.height}},
+                                 {"k", {camera.fx, camera.fy, camera.cx, camera.cy}},
+                                 {"distortion", camera.distortion}};
+  if (camera.has_pose) {
+    json["table_from_camera"] = std::vector<double>(pose.data(), pose.data() + pose.size());
+  }
+  return json;
 }
 
 nlohmann::ordered_json ResponseToJson(const Response& response) {
@@ -123,9 +129,11 @@ std::string WhatLight(std::string_view what, size_t k) {
   return fmt::format("{}: lights[{}]", what, k);
 }
 
-Status CheckLights(const Lights& lights, bool has_camera, std::string_view what) {
-  if (lights.empty()) {
-    return Fail(ErrorCode::kBadData, "{}: lights is empty; need at least one light", what);
+Status CheckLights(const Lights& lights, const std::optional<Camera>& camera,
+                   std::string_view what) {
+  if (lights.empty() && !camera) {
+    return Fail(ErrorCode::kBadData, "{}: lights is empty; need at least one light, or a camera",
+                what);
   }
   std::set<std::string_view> names;
   for (size_t k = 0; k < lights.size(); ++k) {
@@ -141,7 +149,13 @@ Status CheckLights(const Lights& lights, bool has_camera, std::string_view what)
       return Fail(ErrorCode::kBadData, "{}: the name \"{}\" is taken; give each light its own",
                   WhatLight(what, k), light.name);
     }
-    if (light.model != LightModel::kDistant && !has_camera) {
+    if (light.model != LightModel::kDistant && camera && !camera->has_pose) {
+      return Fail(ErrorCode::kBadData,
+                  "{}: camera has no table_from_camera, but lights[{}] is \"{}\": no pixel has a "
+                  "place on the table; run sateen calibrate pose first, then add near lights",
+                  what, k, Name(light.model));
+    }
+    if (light.model != LightModel::kDistant && !camera) {
       return Fail(
           ErrorCode::kBadData,
           "{}: camera is missing, but lights[{}] is \"{}\": without a camera no pixel has a "
@@ -166,7 +180,23 @@ Status Rig::Validate(std::string_view what) const {
       !Json::parse(calibration_json, nullptr, /*allow_exceptions=*/false).is_object()) {
     return Fail(ErrorCode::kBadData, "{}: calibration is not a JSON object; need one", what);
   }
-  return status.and_then([&] { return CheckLights(lights, camera.has_value(), what); });
+  return status.and_then([&] { return CheckLights(lights, camera, what); });
+}
+
+Status Rig::RequirePose(std::string_view what) const {
+  if (!camera) {
+    return Fail(ErrorCode::kBadData,
+                "{}: the rig has no camera, so that no pixel has a place on the table; run sateen "
+                "calibrate lens, then sateen calibrate pose",
+                what);
+  }
+  if (!camera->has_pose) {
+    return Fail(ErrorCode::kBadData,
+                "{}: the rig's camera has a lens but no pose yet, so that no pixel has a place on "
+                "the table; run sateen calibrate pose",
+                what);
+  }
+  return {};
 }
 
 Result<Rig> ReadRig(const std::filesystem::path& path) {
@@ -219,7 +249,9 @@ std::string RigToJson(const Rig& rig) {
   for (const Light& light : rig.lights) {
     lights.push_back("    " + Line(ToJson(light)));
   }
-  members.push_back(fmt::format("  \"lights\": [\n{}\n  ]", fmt::join(lights, ",\n")));
+  members.push_back(lights.empty()
+                        ? R"(  "lights": [])"
+                        : fmt::format("  \"lights\": [\n{}\n  ]", fmt::join(lights, ",\n")));
   if (!rig.calibration_json.empty()) {
     members.push_back("  \"calibration\": " + rig.calibration_json);
   }

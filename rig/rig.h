@@ -22,13 +22,15 @@ struct Response {
 // The measured scanner: one camera, K lights, one table. A plain value; docs/formats.md describes
 // the file.
 struct Rig {
-  std::optional<Camera> camera;  // absent only when every light is distant
+  std::optional<Camera> camera;  // absent, or without a pose, only when every light is distant
   std::optional<Response> response;
-  Lights lights;
+  Lights lights;                 // empty only where there is a camera: while it is calibrated
   std::string calibration_json;  // figures and input hashes, kept as they were read
 
   // kBadData names the first thing that is out of range or missing. `what` is the file.
   [[nodiscard]] Status Validate(std::string_view what) const;
+  // kBadData unless pixels have a place on the table; says which calibration is missing.
+  [[nodiscard]] Status RequirePose(std::string_view what) const;
 };
 
 // Errors   kIo: the file is absent or unreadable

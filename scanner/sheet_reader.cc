@@ -222,11 +222,8 @@ Status CheckPlan(const std::filesystem::path& dir, const CapturePlan& plan, bool
     return Fail(ErrorCode::kBadData, "{}: is a session of kind '{}'; need a sheet", dir.string(),
                 Name(plan.session->kind));
   }
-  if (!plan.rig.camera) {
-    return Fail(ErrorCode::kBadData,
-                "{}: the rig has no camera; calibrate lens and pose first, so that pixels have a "
-                "place on the sheet",
-                dir.string());
+  if (Status pose = plan.rig.RequirePose(dir.string()); !pose) {
+    return pose;
   }
   if (std::ranges::none_of(plan.lit, [](const auto& file) { return file.has_value(); })) {
     return Fail(ErrorCode::kBadData, "{}: has no lit frame", dir.string());

@@ -215,6 +215,13 @@ Status Scene::Validate() const {
   if (!rig.camera) {
     return Fail(ErrorCode::kInvalidArgument, "the rig has no camera; need one, for the frames");
   }
+  if (!rig.camera->has_pose) {
+    return Fail(ErrorCode::kInvalidArgument,
+                "the rig's camera has no table_from_camera; need it, for the frames");
+  }
+  if (rig.lights.empty()) {
+    return Fail(ErrorCode::kInvalidArgument, "the rig has no lights; need one, for the frames");
+  }
   if (!(surface->MaxSlope() <= kSteepest)) {
     return Fail(ErrorCode::kInvalidArgument,
                 "surface rises by {:g} mm a millimetre somewhere; need at most {:g}, which is 89.4 "

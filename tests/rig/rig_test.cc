@@ -196,11 +196,11 @@ TEST(ReadRig, UnknownKeysAreErrorsAtEveryLevel) {
 }
 
 TEST(ReadRig, MissingKeysAreNamed) {
-  for (const char* pointer : {"/camera/model", "/camera/size_px", "/camera/k", "/camera/distortion",
-                              "/camera/table_from_camera", "/response/black", "/response/white",
-                              "/response/white_balance", "/lights/0/name", "/lights/0/channel",
-                              "/lights/0/model", "/lights/0/direction", "/lights/1/position_mm",
-                              "/lights/2/axis", "/lights/2/anisotropy", "/lights/2/flux_rgb"}) {
+  for (const char* pointer :
+       {"/camera/model", "/camera/size_px", "/camera/k", "/camera/distortion", "/response/black",
+        "/response/white", "/response/white_balance", "/lights/0/name", "/lights/0/channel",
+        "/lights/0/model", "/lights/0/direction", "/lights/1/position_mm", "/lights/2/axis",
+        "/lights/2/anisotropy", "/lights/2/flux_rgb"}) {
     const std::string key = std::filesystem::path(pointer).filename();
     EXPECT_THAT(MessageWithout(pointer), HasSubstr("." + key + " is missing; need")) << pointer;
   }
@@ -211,6 +211,26 @@ TEST(ReadRig, MissingKeysAreNamed) {
 
 TEST(ReadRig, CameraIsNeededUnlessAllLightsAreDistant) {
   EXPECT_THAT(MessageWithout("/camera"), HasSubstr("camera is missing, but lights[1] is \"near\""));
+}
+
+// What `calibrate lens` writes without a rig to begin from, and `calibrate pose` then completes.
+TEST(ReadRig, ACameraIsEnoughAndItsPoseMayCome) {
+  Json json = FullRig();
+  json["lights"] = Json::array();
+  ASSERT_TRUE(Read(json.dump()).value().RequirePose("a.json"));
+  json["camera"].erase("table_from_camera");
+  const Rig rig = Read(json.dump()).value();
+  EXPECT_FALSE(rig.camera->has_pose);
+  EXPECT_THAT(rig.RequirePose("a.json").error().message,
+              HasSubstr("a.json: the rig's camera has a lens but no pose yet"));
+  EXPECT_THAT(Rig().RequirePose("a.json").error().message, HasSubstr("the rig has no camera"));
+  EXPECT_EQ(RigToJson(Read(RigToJson(rig)).value()), RigToJson(rig));
+
+  EXPECT_THAT(MessageWithout("/camera/table_from_camera"),
+              HasSubstr("no table_from_camera, but lights[1] is \"near\""));
+  json.erase("camera");
+  EXPECT_THAT(Read(json.dump()).error().message,
+              HasSubstr("lights is empty; need at least one light, or a camera"));
 }
 
 TEST(ReadRig, ValuesOutOfRangeAreNamed) {
@@ -224,7 +244,6 @@ TEST(ReadRig, ValuesOutOfRangeAreNamed) {
               HasSubstr("white_balance is [1, 0"));
   EXPECT_THAT(MessageWith("/response/read_noise_dn", -1), HasSubstr("read_noise_dn is -1"));
   EXPECT_THAT(MessageWith("/response/gain_dn_per_electron", 0), HasSubstr("electron is 0"));
-  EXPECT_THAT(MessageWith("/lights", Json::array()), HasSubstr("lights is empty"));
   EXPECT_THAT(MessageWith("/lights/1/channel", -1), HasSubstr("lights[1]: channel is -1"));
   EXPECT_THAT(MessageWith("/lights/1/name", "a"), HasSubstr("the name \"a\" is taken"));
   EXPECT_THAT(MessageWith("/lights/1/name", ""), HasSubstr("lights[1].name is \"\"; need a name"));
