@@ -12,14 +12,14 @@ namespace sateen {
 namespace {
 
 constexpr size_t kFewestCorners = 6;
-constexpr size_t kFewestMarkers = 3;
-constexpr double kFewestInPlace = 0.9;  // of the markers
-constexpr double kMarkerSlack = 0.35;   // of a square: how far a lens may bend the board
-constexpr size_t kMarkersOfAPatch = 4;  // from which a corner's place is predicted
-constexpr double kPatchSquares = 3.0;   // squares to the farthest of them
-constexpr double kReachOfGap = 0.9;     // between a corner and the markers, read and refined in
-constexpr double kQuadrant = 0.35;      // of the side that CrossingContrast() is given, at most
-constexpr double kCrossing = 0.25;      // of the board's contrast, below which it is no corner
+constexpr size_t kFewestBoardMarkers = 3;
+constexpr double kFewestBoardInPlace = 0.9;  // of the markers
+constexpr double kMarkerSlack = 0.35;        // of a square: how far a lens may bend the board
+constexpr size_t kMarkersOfAPatch = 4;       // from which a corner's place is predicted
+constexpr double kPatchSquares = 3.0;        // squares to the farthest of them
+constexpr double kReachOfGap = 0.9;      // between a corner and the markers, read and refined in
+constexpr double kQuadrantShare = 0.35;  // of the side that CrossingContrast() is given, at most
+constexpr double kCrossing = 0.25;       // of the board's contrast, below which it is no corner
 
 // One marker of the board, seen.
 struct BoardMarker {
@@ -132,7 +132,7 @@ BoardView CornersBeside(const Image<uint8_t>& grey, const BoardSpec& spec,
       continue;
     }
     const std::optional<double> crossing =
-        CrossingContrast(grey, *map, at_mm.head<2>(), reach_mm / kQuadrant);
+        CrossingContrast(grey, *map, at_mm.head<2>(), reach_mm / kQuadrantShare);
     const Eigen::Vector2d rough = MapPoint(*map, at_mm.head<2>());
     const int window_px = CornerWindowPx(*map, at_mm.head<2>(), reach_mm);
     const Eigen::Vector2d corner = RefineCorner(smooth, rough, window_px);
@@ -158,14 +158,15 @@ BoardView CornersBeside(const Image<uint8_t>& grey, const BoardSpec& spec,
 
 Result<BoardView> FindCharuco(const Image<uint8_t>& grey, const BoardSpec& spec) {
   const std::vector<MarkerView> seen = FindMarkers(grey, spec.dictionary);
-  if (seen.size() < kFewestMarkers) {
+  if (seen.size() < kFewestBoardMarkers) {
     return Fail(ErrorCode::kDegenerate,
                 "{} markers of {} found; need {}: show the board, flat, sharp and evenly lit, and "
                 "name its own dictionary",
-                seen.size(), spec.dictionary, kFewestMarkers);
+                seen.size(), spec.dictionary, kFewestBoardMarkers);
   }
   const std::vector<BoardMarker> markers = InPlace(BoardMarkersOf(seen, spec), spec.square_mm);
-  if (static_cast<double>(markers.size()) < kFewestInPlace * static_cast<double>(seen.size())) {
+  if (static_cast<double>(markers.size()) <
+      kFewestBoardInPlace * static_cast<double>(seen.size())) {
     return Fail(
         ErrorCode::kDegenerate,
         "{} of {} markers lie where '{}' has them; it is another board, or of the other pattern "

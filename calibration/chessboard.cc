@@ -14,7 +14,7 @@ namespace {
 
 constexpr int kWidestForBoardPx = 1600;  // wider pictures are shrunk to find the board in them
 constexpr double kCornerReach = 0.25;    // of a square, about a corner, from which it is refined
-constexpr double kCrossing = 0.7;        // of the board's contrast; a mere edge has half
+constexpr double kBoardCrossing = 0.7;   // of the board's contrast; a mere edge has half
 
 // Every corner to about a pixel, row by row from either end; none if not found.
 std::vector<Eigen::Vector2d> RoughCorners(const Image<uint8_t>& grey, const BoardSpec& spec) {
@@ -72,7 +72,7 @@ bool GoesOn(const Image<uint8_t>& grey, const BoardSpec& spec, const PlaneMap& m
     const Eigen::Vector2d at_mm = {(column - 0.5 * spec.columns) * spec.square_mm,
                                    (0.5 * spec.rows - row) * spec.square_mm};
     const double crossing = CrossingContrast(grey, map, at_mm, spec.square_mm).value_or(0.0);
-    return std::abs(crossing) > kCrossing * contrast ? 1 : 0;
+    return std::abs(crossing) > kBoardCrossing * contrast ? 1 : 0;
   };
   std::array<int, 4> crossings = {};
   for (int row = 1; row < spec.rows; ++row) {

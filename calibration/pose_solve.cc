@@ -13,9 +13,9 @@ namespace {
 
 using Vector6d = Eigen::Matrix<double, 6, 1>;
 
-constexpr int kMostSteps = 100;
-constexpr double kStepTaken = 1e-12;  // relative fall of the cost that ends the steps
-constexpr double kRadStep = 1e-6;     // of numeric derivatives
+constexpr int kMostPoseSteps = 100;
+constexpr double kPoseStepTaken = 1e-12;  // relative fall of the cost that ends the steps
+constexpr double kRadStep = 1e-6;         // of numeric derivatives
 constexpr double kMmStep = 1e-4;
 constexpr double kSamePose = 0.1 * kRadPerDeg;
 constexpr double kClearlyWorse = 9.0;  // variances: 3 standard deviations
@@ -41,7 +41,7 @@ PlanePose RefinedPose(const Camera& camera, const Eigen::Isometry3d& start,
   Matrix6d normal = Matrix6d::Zero();
   double damping = 1e-6;
   bool settled = false;
-  for (int step = 0; step < kMostSteps && !settled; ++step) {
+  for (int step = 0; step < kMostPoseSteps && !settled; ++step) {
     for (Eigen::Index k = 0; k < 6; ++k) {
       const double h = k < 3 ? kRadStep : kMmStep;
       const Vector6d move = h * Vector6d::Unit(k);
@@ -53,14 +53,14 @@ PlanePose RefinedPose(const Camera& camera, const Eigen::Isometry3d& start,
     normal = jacobian.transpose() * jacobian;
     const Vector6d slope = jacobian.transpose() * residuals;
     settled = true;
-    for (int attempt = 0; attempt < kMostSteps; ++attempt) {
+    for (int attempt = 0; attempt < kMostPoseSteps; ++attempt) {
       Matrix6d damped = normal;
       damped.diagonal() *= 1.0 + damping;
       const Eigen::Isometry3d next = Moved(result.camera_from_plane, -damped.ldlt().solve(slope));
       const Eigen::VectorXd at_next = ResidualsPx(camera, next, points_mm, corners_px);
       if (at_next.squaredNorm() < residuals.squaredNorm()) {
-        settled =
-            residuals.squaredNorm() - at_next.squaredNorm() < kStepTaken * residuals.squaredNorm();
+        settled = residuals.squaredNorm() - at_next.squaredNorm() <
+                  kPoseStepTaken * residuals.squaredNorm();
         result.camera_from_plane = next;
         residuals = at_next;
         damping = std::max(damping / 10.0, 1e-12);

@@ -10,8 +10,8 @@
 namespace sateen::cli {
 namespace {
 
-constexpr int kWidthPx = 1000;
-constexpr int kHeadPx = 34;
+constexpr int kAxesWidthPx = 1000;
+constexpr int kAxesHeadPx = 34;
 constexpr double kGridMm = 50.0;
 constexpr double kReachMm = 1000.0;  // of the grid
 constexpr double kAxisMm = 50.0;
@@ -44,7 +44,7 @@ class TablePen {
     const auto at = PixelOfPinholePixel(camera_, ideal.x(), ideal.y());
     const bool inside = at && at->x() > -1.0 && at->y() > -1.0 && at->x() < camera_.size_px.width &&
                         at->y() < camera_.size_px.height;
-    return inside ? std::optional<Eigen::Vector2d>(scale_ * *at + Eigen::Vector2d(0, kHeadPx))
+    return inside ? std::optional<Eigen::Vector2d>(scale_ * *at + Eigen::Vector2d(0, kAxesHeadPx))
                   : std::nullopt;
   }
 
@@ -74,10 +74,10 @@ Status DrawPose(const PoseCalibration& result, double thickness_mm) {
   if (!picture) {
     return tl::unexpected(picture.error());
   }
-  const double scale = static_cast<double>(kWidthPx) / picture->grey.width;
+  const double scale = static_cast<double>(kAxesWidthPx) / picture->grey.width;
   const Rgb8 photo = ScaledGrey(picture->grey, scale);
-  Canvas canvas(kWidthPx, kHeadPx + photo[0].height, {24, 26, 30});
-  canvas.Place(photo, 0, kHeadPx);
+  Canvas canvas(kAxesWidthPx, kAxesHeadPx + photo[0].height, {24, 26, 30});
+  canvas.Place(photo, 0, kAxesHeadPx);
   canvas.Text({12, 22},
               fmt::format("Table: x red, y green, z blue, {:g} mm each; blue grid {:g} mm; origin "
                           "at the board's centre",

@@ -17,7 +17,8 @@ using ::testing::HasSubstr;
 void WriteScene(const std::filesystem::path& folder, const std::string& name,
                 const std::string& distortion) {
   std::string lights;
-  for (const char* direction : {"[0.6, 0, 0.8]", "[0, 0.6, 0.8]", "[-0.6, 0, 0.8]", "[0, -0.6, 0.8]"}) {
+  for (const char* direction :
+       {"[0.6, 0, 0.8]", "[0, 0.6, 0.8]", "[-0.6, 0, 0.8]", "[0, -0.6, 0.8]"}) {
     lights += fmt::format(R"({}{{"name": "l{}", "channel": 0, "model": "distant",
         "direction": {}, "flux_rgb": [1, 1, 1]}})",
                           lights.empty() ? "" : ",", lights.size(), direction);
@@ -62,8 +63,9 @@ TEST(SolveUndistort, GivesThePinholeCamerasTruth) {
   };
   const ErrorStatistics bent = error_deg({}, "as-photographed");
   const ErrorStatistics straight = error_deg({"--undistort"}, "undistorted");
-  fmt::print("against the pinhole camera's truth: {:.3f} degrees, undistorted {:.4f} (worst {:.3f})\n",
-             bent.mean, straight.mean, straight.max);
+  fmt::print(
+      "against the pinhole camera's truth: {:.3f} degrees, undistorted {:.4f} (worst {:.3f})\n",
+      bent.mean, straight.mean, straight.max);
   EXPECT_GT(bent.mean, 0.5);
   EXPECT_LT(straight.mean, 0.01);
   EXPECT_LT(straight.max, 0.2);  // linear between pixels at the border
@@ -76,8 +78,8 @@ TEST(SolveUndistort, NeedsACamera) {
     ASSERT_TRUE(WriteExr(folder.Path() / fmt::format("{}.exr", k), Image3({8, 8}, 0.5F)));
   }
   WriteText(folder.Path() / "lights.txt", "0.6 0 0.8\n0 0.6 0.8\n-0.6 0 0.8\n");
-  const RunResult run = Solve(
-      {folder.Path().string(), "-o", (folder.Path() / "maps").string(), "--undistort"});
+  const RunResult run =
+      Solve({folder.Path().string(), "-o", (folder.Path() / "maps").string(), "--undistort"});
   EXPECT_EQ(run.exit_status, 3);
   EXPECT_THAT(run.log, HasSubstr("--undistort needs the lens, and the rig has no camera"));
   EXPECT_FALSE(std::filesystem::exists(folder.Path() / "maps"));
