@@ -7,6 +7,7 @@
 #include "cli/calibrate_lens.h"
 #include "cli/calibrate_lights.h"
 #include "cli/calibrate_pose.h"
+#include "cli/calibrate_response.h"
 #include "cli/calibrate_spheres.h"
 #include "core/task.h"
 
@@ -17,6 +18,7 @@ struct CalibrateArgs {
   CalibrateLensArgs lens;
   CalibratePoseArgs pose;
   CalibrateLightsArgs lights;
+  CalibrateResponseArgs response;
   CalibrateSpheresArgs spheres;
   CalibrateCheckArgs check;
 };

@@ -199,11 +199,11 @@ class LightsCalibrator {
     if (!truth) {
       return tl::unexpected(truth.error());
     }
-    truth_lights = truth->lights;
+    truth_lights = Rebalanced(truth->lights, WhiteBalanceOf(*truth), WhiteBalanceOf(result_.rig));
     for (size_t k = 0; k < result_.lights.size(); ++k) {
       const Light& fitted = result_.rig.lights[k];
-      const auto light = std::ranges::find(truth->lights, fitted.name, &Light::name);
-      if (light == truth->lights.end()) {
+      const auto light = std::ranges::find(truth_lights, fitted.name, &Light::name);
+      if (light == truth_lights.end()) {
         continue;
       }
       LightFigures& figures = result_.lights[k];

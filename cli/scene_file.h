@@ -18,6 +18,10 @@ struct ExposureRecord {
   double exposure_s = 0.02;
   double f_number = 8.0;
   double iso = 100.0;
+  // A chart: exposure times, each as bright as its time says; empty: exposure_s alone.
+  std::vector<double> series_s = {};
+  std::string series_light;  // the light that has the series; empty: all
+  int repeats = 1;           // frames of each kind
 };
 
 struct SceneFile {

@@ -128,11 +128,6 @@ Status CheckSupported(const SolveArgs& args, Capture& capture) {
                 "{}: is the capture itself; give a folder of its own for the maps",
                 args.output.string());
   }
-  if (capture.rig.response && capture.rig.response->white_balance != Eigen::Vector3d::Ones()) {
-    capture.warnings.push_back(
-        "the rig's response.white_balance is not applied: colours are those of the frames and the "
-        "lights' flux_rgb");
-  }
   return {};
 }
 

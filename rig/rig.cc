@@ -199,6 +199,17 @@ Status Rig::RequirePose(std::string_view what) const {
   return {};
 }
 
+Eigen::Vector3d WhiteBalanceOf(const Rig& rig) {
+  return rig.response ? rig.response->white_balance : Eigen::Vector3d::Ones();
+}
+
+Lights Rebalanced(Lights lights, const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
+  for (Light& light : lights) {
+    light.flux_rgb = light.flux_rgb.cwiseProduct(to).cwiseQuotient(from);
+  }
+  return lights;
+}
+
 Result<Rig> ReadRig(const std::filesystem::path& path) {
   const Result<Json> file = ReadJsonFile(path, "sateen.rig", 1);
   if (!file) {

@@ -33,6 +33,14 @@ struct Rig {
   [[nodiscard]] Status RequirePose(std::string_view what) const;
 };
 
+// A rig's white balance; 1 where it has no response.
+[[nodiscard]] Eigen::Vector3d WhiteBalanceOf(const Rig& rig);
+
+// The lights as a rig of another white balance has them: fluxes are in balanced units, as the frames
+// are (scanner/sensor_reading.h), so that albedo stays what it is.
+[[nodiscard]] Lights Rebalanced(Lights lights, const Eigen::Vector3d& from,
+                                const Eigen::Vector3d& to);
+
 // Errors   kIo: the file is absent or unreadable
 //          kBadData: not schema sateen.rig/1; a key that is missing, unknown, out of range or not
 //          of the light's model; a light that is not above the table

@@ -19,7 +19,7 @@ struct BlockMean {
   // Of one site, from how neighbours of one colour differ: a slope across the block is no noise.
   Eigen::Vector3d site_variance_rgb = Eigen::Vector3d::Zero();
   Eigen::Vector3d sites_rgb = Eigen::Vector3d::Zero();  // how many sites of each colour
-  bool saturated = false;  // a site at or above 98 % of the white level
+  bool saturated = false;                               // a site at or above 98 % of what saturates
 };
 
 // A frame as the means of its blocks, rows from the top: what a fit of smooth light needs of it.

@@ -88,6 +88,14 @@ Status ReplaceRig(const fs::path& rig_file, CapturePlan& plan) {
   }
   plan.sha256_of_input[rig_file.string()] = *hash;
   plan.rig = *std::move(rig);
+  for (std::optional<FrameFile>& frame : plan.lit) {
+    if (frame) {
+      frame->response = plan.rig.response;
+    }
+  }
+  for (FrameFile& frame : plan.dark) {
+    frame.response = plan.rig.response;
+  }
   return {};
 }
 
