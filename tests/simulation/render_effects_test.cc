@@ -137,8 +137,9 @@ TEST(Effects, APrintLiesInThePlaneUndistorted) {
                            Eigen::AngleAxisd(0.5, Eigen::Vector3d::UnitZ());
   for (int column = 0; column < 4; ++column) {
     for (int row = 0; row < 4; ++row) {
-      for (const double inset : {0.01, 9.99}) {  // just within the square's corners
-        const Eigen::Vector3d at(-20.0 + 10.0 * column + inset, 20.0 - 10.0 * row - inset, 0.0);
+      for (int corner = 0; corner < 4; ++corner) {  // just within the square's corners
+        const Eigen::Vector3d at(-20.0 + 10.0 * column + (corner % 2 == 0 ? 0.01 : 9.99),
+                                 20.0 - 10.0 * row - (corner < 2 ? 0.01 : 9.99), 0.0);
         const Eigen::Vector3d on_table = chess.table_from_print * at;
         EXPECT_EQ(AlbedoAt(chess, on_table.x(), on_table.y())[0], (column + row) % 2)
             << column << ' ' << row;
