@@ -332,7 +332,7 @@ TEST(SimulateCommand, ASeriesIsOfChartsInRawFilesAlone) {
   EXPECT_THAT(log_of(exposure("chart", R"("series_s": [])")),
               HasSubstr("an array of finite numbers, at least one"));
   EXPECT_THAT(log_of(exposure("chart", R"("series_s": [0])")), HasSubstr("need 1e-6 to 1e5 each"));
-  EXPECT_THAT(log_of(exposure("chart", R"("repeats": 0)")), HasSubstr("repeats is 0"));
+  EXPECT_THAT(log_of(exposure("chart", R"("repeats": 0)")), HasSubstr("repeats 0; need 1 to 100"));
   EXPECT_THAT(log_of(exposure("chart", R"("series_light": "led-77")")),
               HasSubstr("exposure.series_light is 'led-77', which the rig has not"));
   EXPECT_THAT(log_of(exposure("chart", R"("repeats": 2)"), {"--linear"}),
