@@ -20,9 +20,9 @@ constexpr double kWeightScale = 2.0;  // of the residuals' spread
 constexpr double kLeastGain = 1e-3;
 constexpr double kLeastVariance = 1e-24;
 constexpr double kConvergedMm = 1e-5;
-constexpr double kReferenceMm2 = 1e6;      // where flux is irradiance, squared
-constexpr double kLeastRoughness = 100.0;  // second differences of 0.1: rougher than any lens
-constexpr double kMostRoughness = 1e7;
+constexpr double kReferenceMm2 = 1e6;       // where flux is irradiance, squared
+constexpr double kLeastRoughness = 100.0;   // second differences of 0.1: rougher than any lens
+constexpr int kRoughnessTrials = 6;         // each ten times the last
 constexpr Eigen::Index kLightUnknowns = 6;  // position, log flux; then the gains
 
 // A grid of gains of 1 under all the rays that meet the samples.
@@ -118,7 +118,8 @@ class FieldFitter {
     const Light start = light_;
     std::vector<std::pair<double, double>> tried;
     double least = std::numeric_limits<double>::infinity();
-    for (double roughness = kLeastRoughness; roughness <= kMostRoughness; roughness *= 10.0) {
+    for (int trial = 0; trial < kRoughnessTrials; ++trial) {
+      const double roughness = kLeastRoughness * std::pow(10.0, trial);
       Step(roughness, variance);
       const std::vector<double> off = Residuals(held_out);
       tried.emplace_back(roughness,

@@ -11,7 +11,7 @@
 namespace sateen {
 namespace {
 
-constexpr size_t kFewestLights = 3;
+constexpr size_t kFewestLightsSeen = 3;
 constexpr double kLeastFilled = 0.25;  // of a tile, against the fullest one
 
 double LuminanceOf(const Eigen::Vector3d& rgb) {
@@ -21,7 +21,7 @@ double LuminanceOf(const Eigen::Vector3d& rgb) {
 }
 
 // One block's equations (1).
-struct BlockSystem {
+struct BlockNormal {
   Eigen::Matrix3d a = Eigen::Matrix3d::Zero();  // sum of l l^T
   Eigen::Vector3d b = Eigen::Vector3d::Zero();  // sum of l i'
   size_t lights = 0;
@@ -42,7 +42,7 @@ struct BlockSystem {
 
   // How far the solved normal is from the sheet's; nothing where too few lights are seen.
   [[nodiscard]] std::optional<Eigen::Vector3d> Deviation() const {
-    if (lights < kFewestLights) {
+    if (lights < kFewestLightsSeen) {
       return std::nullopt;
     }
     const Eigen::Vector3d n = a.ldlt().solve(b).normalized();
@@ -50,8 +50,8 @@ struct BlockSystem {
   }
 };
 
-std::vector<BlockSystem> SystemsOf(const SheetView& sheet, const IncidentOf& incident) {
-  std::vector<BlockSystem> systems(static_cast<size_t>(sheet.columns) *
+std::vector<BlockNormal> SystemsOf(const SheetView& sheet, const IncidentOf& incident) {
+  std::vector<BlockNormal> systems(static_cast<size_t>(sheet.columns) *
                                    static_cast<size_t>(sheet.rows));
   for (size_t k = 0; k < sheet.samples.size(); ++k) {
     for (size_t i = 0; i < sheet.samples[k].size(); ++i) {
@@ -64,16 +64,16 @@ std::vector<BlockSystem> SystemsOf(const SheetView& sheet, const IncidentOf& inc
 // The deviations of the blocks of each tile of the table.
 class Tiles {
  public:
-  Tiles(const std::vector<BlockSystem>& systems, double tile_mm) {
-    for (const BlockSystem& system : systems) {
-      if (system.lights >= kFewestLights) {
+  Tiles(const std::vector<BlockNormal>& systems, double tile_mm) {
+    for (const BlockNormal& system : systems) {
+      if (system.lights >= kFewestLightsSeen) {
         low_ = low_.cwiseMin(system.point_mm.head<2>());
         high_ = high_.cwiseMax(system.point_mm.head<2>());
       }
     }
     counts_ = ((high_ - low_) / tile_mm).array().round().max(1.0);
     tiles_.resize(static_cast<size_t>(counts_.prod()));
-    for (const BlockSystem& system : systems) {
+    for (const BlockNormal& system : systems) {
       if (const std::optional<Eigen::Vector3d> deviation = system.Deviation()) {
         tiles_[IndexOf(system.point_mm)].push_back(*deviation);
       }
@@ -137,13 +137,13 @@ Result<Flatness> FlatnessOf(const SheetView& sheet, const IncidentOf& incident,
   if (Status status = options.Validate(); !status) {
     return tl::unexpected(status.error());
   }
-  const std::vector<BlockSystem> systems = SystemsOf(sheet, incident);
+  const std::vector<BlockNormal> systems = SystemsOf(sheet, incident);
   const auto seen = std::ranges::find_if(
-      systems, [](const BlockSystem& system) { return system.Deviation().has_value(); });
+      systems, [](const BlockNormal& system) { return system.Deviation().has_value(); });
   if (seen == systems.end()) {
     return Fail(ErrorCode::kDegenerate,
                 "no part of the sheet is seen under {} lights; need as many to solve for a normal",
-                kFewestLights);
+                kFewestLightsSeen);
   }
   const Eigen::Vector3d normal = seen->normal;
   Flatness flatness;

@@ -11,7 +11,7 @@
 namespace sateen {
 namespace {
 
-constexpr size_t kFewestSamples = 50;
+constexpr size_t kFewestOfALight = 50;
 constexpr size_t kHeldOutEvery = 5;
 constexpr double kExplained = 1.1;  // times the noise
 constexpr double kStartAnisotropy = 1.0;
@@ -49,8 +49,8 @@ void ScaleFlux(const std::vector<SheetSample>& samples, double albedo, Light& li
   }
 }
 
-double WorstDirectionSd(const std::vector<SheetSample>& samples, const Eigen::Vector3d& position_mm,
-                        const Eigen::Matrix3d& covariance) {
+double WorstSdOfDirection(const std::vector<SheetSample>& samples,
+                          const Eigen::Vector3d& position_mm, const Eigen::Matrix3d& covariance) {
   double worst = 0.0;
   for (const SheetSample& sample : samples) {
     const Eigen::Vector3d d = position_mm - sample.point_mm;
@@ -66,9 +66,9 @@ double WorstDirectionSd(const std::vector<SheetSample>& samples, const Eigen::Ve
 }
 
 Status CheckSamples(const std::vector<SheetSample>& samples) {
-  if (samples.size() < kFewestSamples) {
+  if (samples.size() < kFewestOfALight) {
     return Fail(ErrorCode::kDegenerate, "{} samples of the sheet; need at least {}", samples.size(),
-                kFewestSamples);
+                kFewestOfALight);
   }
   const bool all_dark = std::ranges::all_of(
       samples, [](const SheetSample& s) { return s.radiance_rgb.maxCoeff() <= 0.0; });
@@ -198,8 +198,8 @@ Status FitToAll(const LightResiduals& residuals, const RungFit& best, const Ligh
   const Eigen::MatrixXd covariance = fit->covariance * (scale * scale);
   result.position_sd_mm = covariance.diagonal().head<3>().cwiseSqrt();
   result.flux_sd = covariance.diagonal().tail<3>().cwiseSqrt();
-  result.direction_sd_rad = WorstDirectionSd(residuals.Samples(), result.light.position_mm,
-                                             covariance.topLeftCorner<3, 3>());
+  result.direction_sd_rad = WorstSdOfDirection(residuals.Samples(), result.light.position_mm,
+                                               covariance.topLeftCorner<3, 3>());
   return {};
 }
 

@@ -17,13 +17,13 @@ constexpr double kLargestAnisotropy = 50.0;
 constexpr double kLeastEigenvalue = 1e-12;  // of the scaled normal equations
 
 // A light as the solver moves it.
-struct Unknowns {
+struct LightUnknowns {
   Eigen::Vector3d position_mm;
   Eigen::Vector3d log_flux;
   Eigen::Vector3d axis;
   double anisotropy;
 
-  explicit Unknowns(const Light& light)
+  explicit LightUnknowns(const Light& light)
       : position_mm(light.position_mm),
         log_flux(light.flux_rgb.array().log()),
         axis(light.axis),
@@ -101,7 +101,7 @@ Result<Eigen::MatrixXd> CovarianceOf(ceres::Problem& problem) {
       }
     }
   }
-  // Unknowns have units of their own; only after each is scaled does the rank mean something.
+  // LightUnknowns have units of their own; only after each is scaled does the rank mean something.
   const Eigen::VectorXd scale = normal.diagonal().cwiseSqrt().cwiseMax(1e-300);
   const Eigen::MatrixXd scaled =
       scale.cwiseInverse().asDiagonal() * normal * scale.cwiseInverse().asDiagonal();
@@ -118,7 +118,7 @@ Result<Eigen::MatrixXd> CovarianceOf(ceres::Problem& problem) {
 
 // Adds (1) of one sample.
 void AddTo(ceres::Problem& problem, LightModel model, const NearResidual& near, double loss_scale,
-           Unknowns& unknowns) {
+           LightUnknowns& unknowns) {
   ceres::LossFunction* loss = loss_scale > 0.0 ? new ceres::CauchyLoss(loss_scale) : nullptr;
   if (model == LightModel::kLed) {
     problem.AddResidualBlock(
@@ -174,7 +174,7 @@ double LightResiduals::NoiseRms(const Light& light, const std::vector<size_t>& i
 Result<LightDescent> LightResiduals::Descend(LightModel model, const Light& start,
                                              const std::vector<size_t>& indices, double loss_scale,
                                              bool with_covariance) const {
-  Unknowns unknowns(start);
+  LightUnknowns unknowns(start);
   ceres::Problem problem;
   for (const size_t index : indices) {
     AddTo(problem, model, NearResidual{&samples_[index], albedo_}, loss_scale, unknowns);

@@ -3,12 +3,13 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 
 namespace sateen {
 namespace {
 
-constexpr int kMostSteps = 20;  // of Gauss and Newton's method in (2)
-constexpr double kLeastStepMm = 1e-9;
+constexpr int kMostPositionSteps = 20;  // of Gauss and Newton's method in (2)
+constexpr double kLeastPositionStepMm = 1e-9;
 
 using Map = std::vector<Eigen::Vector3d>;
 
@@ -18,8 +19,8 @@ Map SmoothedAlong(const Map& map, int count, int stride, int lines, int line_str
   Map smoothed = map;
   for (int line = 0; line < lines; ++line) {
     for (int i = 1; i + 1 < count; ++i) {
-      const int at = line * line_stride + i * stride;
-      const auto value = [&](int offset) -> const Eigen::Vector3d& {
+      const std::ptrdiff_t at = std::ptrdiff_t{line} * line_stride + std::ptrdiff_t{i} * stride;
+      const auto value = [&](std::ptrdiff_t offset) -> const Eigen::Vector3d& {
         return map[static_cast<size_t>(at + offset)];
       };
       if (value(-stride).x() > 0.0 && value(0).x() > 0.0 && value(stride).x() > 0.0) {
@@ -58,7 +59,7 @@ class Procedure {
   [[nodiscard]] Eigen::Vector3d SolvePosition(const Map& intensity, Eigen::Vector3d s) const {
     double log_phi =
         options_.direction_step == DirectionStep::kFallOff ? MeanLogFlux(intensity, s) : 0.0;
-    for (int step = 0; step < kMostSteps; ++step) {
+    for (int step = 0; step < kMostPositionSteps; ++step) {
       Eigen::Matrix4d a = Eigen::Matrix4d::Zero();
       Eigen::Vector4d b = Eigen::Vector4d::Zero();
       for (size_t i = 0; i < samples_.size(); ++i) {
@@ -73,7 +74,7 @@ class Procedure {
       const Eigen::Vector4d change = a.ldlt().solve(b);
       s += change.head<3>();
       log_phi += change[3];
-      if (!(change.head<3>().norm() > kLeastStepMm)) {
+      if (!(change.head<3>().norm() > kLeastPositionStepMm)) {
         break;
       }
     }
