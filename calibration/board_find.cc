@@ -36,7 +36,7 @@ std::vector<BoardMarker> BoardMarkersOf(const std::vector<MarkerView>& seen,
   markers.reserve(seen.size());
   for (const MarkerView& marker : seen) {
     if (static_cast<size_t>(marker.id) < centers.size()) {
-      const Eigen::Vector3d c = centers[static_cast<size_t>(marker.id)];
+      const Eigen::Vector3d& c = centers[static_cast<size_t>(marker.id)];
       markers.push_back({.center_mm = c,
                          .corners_mm = {c + Eigen::Vector3d(-half, half, 0.0),
                                         c + Eigen::Vector3d(half, half, 0.0),

@@ -14,7 +14,7 @@ constexpr double kCovered = 0.96;       // of its side
 constexpr double kShiftStepMm = 3.0;    // of the grid
 constexpr double kTurnStepRad = 0.035;  // two degrees
 constexpr double kFinestShiftMm = 0.1;
-constexpr int kRounds = 3;  // of refining with coarse steps again, where fine ones got stuck
+constexpr int kRefineRounds = 3;  // of refining with coarse steps again, where fine ones got stuck
 constexpr double kMostMisfit = 0.33;
 
 struct Place {
@@ -40,7 +40,7 @@ class ChartSearch {
     for (const ChartPatch& patch : chart.patches) {
       for (int i = 0; i < kPlaces * kPlaces; ++i) {
         const Eigen::Vector2d offset((i % kPlaces + 0.5) / kPlaces - 0.5,
-                                     (i / kPlaces + 0.5) / kPlaces - 0.5);
+                                     (static_cast<double>(i / kPlaces) + 0.5) / kPlaces - 0.5);
         places_.push_back({patch.center_mm + kCovered * chart.patch_mm * offset,
                            std::log(patch.reflectance_rgb.mean())});
       }
@@ -109,8 +109,8 @@ Candidate Refine(ChartSearch& search, Candidate best, double& misfit) {
     Candidate next = best;
     for (int i = 0; i < 27; ++i) {
       const Candidate candidate =
-          best +
-          Candidate((i % 3 - 1) * shift_mm, (i / 3 % 3 - 1) * shift_mm, (i / 9 - 1) * turn_rad);
+          best + Candidate((i % 3 - 1) * shift_mm, static_cast<double>(i / 3 % 3 - 1) * shift_mm,
+                           static_cast<double>(i / 9 - 1) * turn_rad);
       const double here = search.Misfit(candidate);
       if (here < misfit) {
         misfit = here;
@@ -158,7 +158,7 @@ Result<ChartPose> FindChart(const Image<float>& cells, const Camera& camera, con
       }
     }
   }
-  for (int round = 0; round < kRounds; ++round) {
+  for (int round = 0; round < kRefineRounds; ++round) {
     best = Refine(search, best, misfit);
   }
   if (misfit > kMostMisfit) {

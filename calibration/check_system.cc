@@ -185,12 +185,12 @@ std::vector<std::vector<CheckSystem::Normal>> CheckSystem::Normals(
 }
 
 CheckSystem::Lie CheckSystem::LieOf(size_t sheet, const RigChange& change) const {
-  constexpr int kPlaces = 5;  // along u and v
+  constexpr int kLiePlaces = 5;  // along u and v
   const SheetHeights& h = change.sheets[sheet];
   Lie lie;
-  for (int i = 0; i < kPlaces * kPlaces; ++i) {
-    const double u = 2.0 * (i % kPlaces) / (kPlaces - 1) - 1.0;
-    const double v = 2.0 * (i / kPlaces) / (kPlaces - 1) - 1.0;
+  for (int i = 0; i < kLiePlaces * kLiePlaces; ++i) {
+    const double u = 2.0 * static_cast<double>(i % kLiePlaces) / (kLiePlaces - 1) - 1.0;
+    const double v = 2.0 * std::floor(static_cast<double>(i) / kLiePlaces) / (kLiePlaces - 1) - 1.0;
     const auto [z, z_u, z_v] = SheetHeightAt(h, u, v);
     lie.height_mm = std::max(lie.height_mm, std::abs(z));
     lie.slope_rad =

@@ -7,6 +7,7 @@
 
 #include "calibration/plane_map.h"
 #include "calibration/pose_solve.h"
+#include "calibration/robust_fit.h"
 #include "core/angle.h"
 
 namespace sateen {
@@ -77,12 +78,6 @@ Result<RawLensFit> RawFit(const std::vector<BoardView>& views, const ViewSet& se
   return fit;
 }
 
-double MedianOf(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 // Fits, and leaves out the worst view as long as it is an outlier.
 Result<RawLensFit> FitWithoutOutliers(const std::vector<BoardView>& views, ViewSet& set,
                                       const LensFitOptions& options, LensFit& report) {
@@ -94,7 +89,7 @@ Result<RawLensFit> FitWithoutOutliers(const std::vector<BoardView>& views, ViewS
       return fit;
     }
     const auto worst = std::max_element(fit->rms_px.begin(), fit->rms_px.end());
-    const double limit_px = options.outlier_ratio * MedianOf(fit->rms_px);
+    const double limit_px = options.outlier_ratio * Median(fit->rms_px);
     if (*worst <= std::max(limit_px, kNoOutlierPx)) {
       return fit;
     }

@@ -6,6 +6,8 @@
 #include <map>
 #include <set>
 
+#include "calibration/robust_fit.h"
+
 namespace sateen {
 namespace {
 
@@ -17,12 +19,6 @@ constexpr size_t kFewestExposures = 3;
 constexpr double kLowestLevelDn = 1.0;
 
 using TimesOfLight = std::map<size_t, std::set<double>>;
-
-double MedianOf(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 class LinearityFit {
  public:
@@ -86,7 +82,7 @@ class LinearityFit {
     }
     std::map<size_t, double> middle;
     for (const auto& [series, values] : rates) {
-      middle[series] = MedianOf(values);
+      middle[series] = Median(values);
     }
     std::map<size_t, std::vector<double>> ratios;  // of each frame
     for (const PatchSample& sample : samples_) {
@@ -96,7 +92,7 @@ class LinearityFit {
       }
     }
     for (const auto& [frame, values] : ratios) {
-      result_.frames.push_back({frame, MedianOf(values)});
+      result_.frames.push_back({frame, Median(values)});
     }
   }
 
@@ -122,11 +118,11 @@ class LinearityFit {
       if (sites[c].empty()) {
         continue;
       }
-      const double level = MedianOf(sites[c]);
+      const double level = Median(sites[c]);
       for (double& site : sites[c]) {
         site = std::abs(site - level);
       }
-      result_.rgb[c].saturation_dn = level - 3.0 * 1.4826 * MedianOf(std::move(sites[c]));
+      result_.rgb[c].saturation_dn = level - 3.0 * 1.4826 * Median(std::move(sites[c]));
       clipped_from_dn_ = std::min(clipped_from_dn_, *result_.rgb[c].saturation_dn);
     }
   }

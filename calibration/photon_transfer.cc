@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kRounding = 1.0 / 12.0;  // variance of rounding to whole readings
 constexpr double kSmallestVariance = 1e-9;
-constexpr int kRounds = 20;
+constexpr int kFitRounds = 20;
 
 struct Line {
   Eigen::Vector2d value = Eigen::Vector2d::Zero();  // sigma^2, g
@@ -26,7 +26,7 @@ Line FitLine(const std::vector<const TransferPoint*>& points) {
   for (const TransferPoint* point : points) {
     expected.push_back(std::max(point->variance_dn2, kRounding));
   }
-  for (int round = 0; round < kRounds; ++round) {
+  for (int round = 0; round < kFitRounds; ++round) {
     Eigen::Matrix2d normal = Eigen::Matrix2d::Zero();
     Eigen::Vector2d right = Eigen::Vector2d::Zero();
     for (size_t i = 0; i < points.size(); ++i) {

@@ -10,16 +10,16 @@
 namespace sateen {
 namespace {
 
-constexpr int kUnknowns = 7;  // w, d, log of the blur
-constexpr int kMostSteps = 30;
-constexpr size_t kFewestMarkers = 4;
+constexpr int kPrintUnknowns = 7;  // w, d, log of the blur
+constexpr int kMostPrintSteps = 30;
+constexpr size_t kFewestPrintMarkers = 4;
 constexpr double kStartBlurPx = 0.7;
 constexpr double kStepTaken = 1e-9;  // relative fall of the cost that ends the steps
 constexpr double kMostDamping = 1e6;
 constexpr double kLeastContrast = 1e-6;  // of a marker's brightness
 
-using Unknowns = Eigen::Matrix<double, kUnknowns, 1>;
-using Normal = Eigen::Matrix<double, kUnknowns, kUnknowns>;
+using PrintUnknowns = Eigen::Matrix<double, kPrintUnknowns, 1>;
+using Normal = Eigen::Matrix<double, kPrintUnknowns, kPrintUnknowns>;
 using Basis = Eigen::Matrix<double, 6, 1>;
 
 // Where a ray from the camera meets the plane, and how that moves with the pose: the plane's
@@ -65,7 +65,7 @@ struct PatchSums {
   double cost = 0.0;
   double contrast = 0.0;  // of white and black
   Normal normal = Normal::Zero();
-  Unknowns slope = Unknowns::Zero();
+  PrintUnknowns slope = PrintUnknowns::Zero();
 };
 
 Basis BasisOf(const PatchPixel& pixel, double white) {
@@ -79,7 +79,7 @@ PatchSums SumsOf(const Patch& patch, const Eigen::Isometry3d& pose, double blur_
   const Eigen::Vector2d blur_mm = blur_px * patch.mm_per_px;
   struct Row {
     Basis basis;
-    Unknowns white_by;  // derivative of W by the unknowns
+    PrintUnknowns white_by;  // derivative of W by the unknowns
   };
   std::vector<Row> rows;
   rows.reserve(patch.pixels.size());
@@ -97,11 +97,11 @@ PatchSums SumsOf(const Patch& patch, const Eigen::Isometry3d& pose, double blur_
   const Eigen::LDLT<Eigen::Matrix<double, 6, 6>> solver(gram);
   const Basis c = solver.solve(moments);
   PatchSums sums{.contrast = std::abs(c[3])};
-  Eigen::Matrix<double, 6, kUnknowns> cross = Eigen::Matrix<double, 6, kUnknowns>::Zero();
+  Eigen::Matrix<double, 6, kPrintUnknowns> cross = Eigen::Matrix<double, 6, kPrintUnknowns>::Zero();
   for (size_t i = 0; i < rows.size(); ++i) {
     const PatchPixel& pixel = patch.pixels[i];
     const double residual = pixel.value - c.dot(rows[i].basis);
-    const Unknowns by = (c[3] + c.tail<2>().dot(pixel.place)) * rows[i].white_by;
+    const PrintUnknowns by = (c[3] + c.tail<2>().dot(pixel.place)) * rows[i].white_by;
     sums.cost += residual * residual;
     sums.slope += by * residual;  // the residual is orthogonal to the basis
     sums.normal += by * by.transpose();
@@ -202,14 +202,14 @@ Normal NormalOf(const State& state) {
 
 State Descend(const std::vector<Patch>& patches, State state) {
   double damping = 1e-6;
-  for (int step = 0; step < kMostSteps && damping <= kMostDamping; ++step) {
+  for (int step = 0; step < kMostPrintSteps && damping <= kMostDamping; ++step) {
     Normal normal = NormalOf(state);
-    Unknowns slope = Unknowns::Zero();
+    PrintUnknowns slope = PrintUnknowns::Zero();
     for (const PatchSums& one : state.sums) {
       slope += one.slope;
     }
     normal.diagonal() *= 1.0 + damping;
-    const Unknowns move = normal.ldlt().solve(slope);
+    const PrintUnknowns move = normal.ldlt().solve(slope);
     State next = StateAt(patches, Moved(state.pose, move.head<6>()),
                          state.log_blur + std::clamp(move[6], -0.5, 0.5));
     const double fall = state.Cost() - next.Cost();
@@ -242,9 +242,9 @@ Result<PrintFit> FitPrint(const Image<float>& picture, const Camera& lens,
       marker_of_patch.push_back(i);
     }
   }
-  if (patches.size() < kFewestMarkers) {
+  if (patches.size() < kFewestPrintMarkers) {
     return Fail(ErrorCode::kDegenerate, "{} markers lie wholly in the picture; need {}",
-                patches.size(), kFewestMarkers);
+                patches.size(), kFewestPrintMarkers);
   }
   const State state = Descend(patches, StateAt(patches, start, std::log(kStartBlurPx)));
   PrintFit fit{.camera_from_plane = state.pose, .blur_px = std::exp(state.log_blur)};
@@ -256,7 +256,7 @@ Result<PrintFit> FitPrint(const Image<float>& picture, const Camera& lens,
   }
   const Normal inverse = NormalOf(state).ldlt().solve(Normal::Identity());
   const auto count = static_cast<double>(patches.size());
-  const double unbiased = count / std::max(count - 0.5 * kUnknowns, 1.0);
+  const double unbiased = count / std::max(count - 0.5 * kPrintUnknowns, 1.0);
   fit.covariance = unbiased * (inverse * scores * inverse).topLeftCorner<6, 6>();
   return fit;
 }

@@ -5,6 +5,7 @@
 
 #include "calibration/border_view.h"
 #include "calibration/print_fit.h"
+#include "calibration/robust_fit.h"
 #include "core/angle.h"
 #include "targets/marker_dictionary.h"
 
@@ -12,7 +13,7 @@ namespace sateen {
 namespace {
 
 constexpr double kEnoughPx = 48.0;  // of a marker, beyond which pixels are joined
-constexpr size_t kFewestMarkers = 4;
+constexpr size_t kFewestBorderMarkers = 4;
 constexpr double kFewestInPlace = 0.9;  // of the markers seen
 constexpr double kSlack = 0.15;         // of a marker: how far its corners may lie off
 constexpr double kNotToScale = 0.06;    // of a marker: what no pose explains
@@ -44,12 +45,6 @@ Camera Shrunk(const Camera& camera, int factor) {
   small.cx = (camera.cx + 0.5) / factor - 0.5;
   small.cy = (camera.cy + 0.5) / factor - 0.5;
   return small;
-}
-
-double Median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 std::vector<double> Known(const std::vector<double>& misfit) {
@@ -97,14 +92,14 @@ class SheetFitter {
 
   Result<BorderView> Find() {
     BorderView view = Seen(mean_);
-    if (view.ids.size() >= kFewestMarkers &&
+    if (view.ids.size() >= kFewestBorderMarkers &&
         static_cast<double>(view.ids.size()) >= kFewestInPlace * static_cast<double>(view.seen)) {
       return view;
     }
     if (Status apart = CheckFramesAgree(); !apart) {
       return tl::unexpected(apart.error());
     }
-    if (view.seen >= kFewestMarkers) {
+    if (view.seen >= kFewestBorderMarkers) {
       return Fail(ErrorCode::kDegenerate,
                   "{} of {} markers found lie where '{}' has them; it is another sheet, it is not "
                   "flat, or two sheets are in view",
@@ -114,7 +109,7 @@ class SheetFitter {
         ErrorCode::kDegenerate,
         "{} markers of the border '{}' found; need {} on more than one side: does the camera "
         "see the paper's rim, sharp, and is it this border?",
-        view.seen, border_.Text(), kFewestMarkers);
+        view.seen, border_.Text(), kFewestBorderMarkers);
   }
 
   // Where the mean of the frames is of no use: is that because they show the border elsewhere?
@@ -122,7 +117,7 @@ class SheetFitter {
     std::optional<std::pair<size_t, BorderView>> first;
     for (size_t k = 0; k < frames_.size(); ++k) {
       BorderView view = Seen(frames_[k]);
-      if (view.ids.size() < kFewestMarkers) {
+      if (view.ids.size() < kFewestBorderMarkers) {
         continue;
       }
       if (!first) {

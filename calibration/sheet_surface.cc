@@ -11,13 +11,13 @@
 namespace sateen {
 namespace {
 
-constexpr int kFewestLights = 4;
+constexpr int kFewestSurfaceLights = 4;
 constexpr double kSpot = 0.02;
 constexpr double kFoldRad = 0.5 * kRadPerDeg;
 constexpr double kSignificant = 5.0;
 
 // The normal equations of (1) of one block.
-struct BlockSystem {
+struct SurfaceSystem {
   Eigen::Matrix3d matrix = Eigen::Matrix3d::Zero();
   Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
   double sum2 = 0.0;
@@ -35,8 +35,8 @@ struct BlockSystem {
 
 SheetSurface SurfaceOf(const CheckedSheet& sheet, const Lights& lights,
                        const ExpectedGreen& expected) {
-  std::vector<BlockSystem> blocks(static_cast<size_t>(sheet.columns) *
-                                  static_cast<size_t>(sheet.rows));
+  std::vector<SurfaceSystem> blocks(static_cast<size_t>(sheet.columns) *
+                                    static_cast<size_t>(sheet.rows));
   for (size_t k = 0; k < lights.size(); ++k) {
     for (size_t j = 0; j < sheet.samples[k].size(); ++j) {
       const SheetSample& sample = sheet.samples[k][j];
@@ -58,8 +58,8 @@ SheetSurface SurfaceOf(const CheckedSheet& sheet, const Lights& lights,
   };
   std::vector<Found> found;
   std::vector<double> left;
-  for (const BlockSystem& block : blocks) {
-    if (block.lights < kFewestLights) {
+  for (const SurfaceSystem& block : blocks) {
+    if (block.lights < kFewestSurfaceLights) {
       continue;
     }
     const Eigen::Matrix3d covariance =

@@ -117,7 +117,7 @@ class CalibrateBench {
       }
     }
     // Denim twill as in samples/scenes: attached shadows, RAW frames with noise.
-    const Status fabric = SimulateScene(
+    Status fabric = SimulateScene(
         kFabric, SceneOf({{"shape", "twill"},
                           {"pitch_mm", 1.6},
                           {"fill", 0.95},

@@ -8,7 +8,7 @@ namespace sateen::cli {
 namespace {
 
 constexpr double kShown = 0.02;  // of the ratio, at full colour
-constexpr int kPanelPx = 240;
+constexpr int kRatioPanelPx = 240;
 constexpr int kColumns = 5;
 constexpr uint8_t kNothing = 96;
 
@@ -244,7 +244,7 @@ Rgb8 RatioPicture(const CalibrationCheck& result, size_t sheet, const CheckedShe
         panel[c].pixels[static_cast<size_t>(view.blocks[k][j])] = colour[c];
       }
     }
-    panels.push_back(Enlarged(panel, kPanelPx / view.columns));
+    panels.push_back(Enlarged(panel, kRatioPanelPx / view.columns));
   }
   return ContactSheet(panels, kColumns);
 }

@@ -164,7 +164,7 @@ std::vector<Chain> ChainsOf(const BoardView& view, int corner_columns) {
 double BowOf(const std::vector<Eigen::Vector2d>& corners, const std::vector<Chain>& chains) {
   double most = 0.0;
   for (const Chain& chain : chains) {
-    const Eigen::Vector2d from = corners[chain.front()];
+    const Eigen::Vector2d& from = corners[chain.front()];
     const Eigen::Vector2d along = (corners[chain.back()] - from).normalized();
     for (const size_t i : chain) {
       const Eigen::Vector2d at = corners[i] - from;

@@ -14,17 +14,17 @@ namespace {
 using Points = std::vector<std::pair<double, double>>;
 
 constexpr std::array<std::string_view, 3> kColours = {"#c0392b", "#1e8449", "#2264c7"};
-constexpr std::array<std::string_view, 3> kNames = {"red", "green", "blue"};
+constexpr std::array<std::string_view, 3> kColourNames = {"red", "green", "blue"};
 constexpr double kLeftPx = 80.0;
 constexpr double kRightPx = 700.0;
-constexpr int kWidthPx = 740;
+constexpr int kPlotWidthPx = 740;
 constexpr std::string_view kDashed = "stroke=\"#555555\" stroke-dasharray=\"5 4\"";
 constexpr int kPatchesPx = 900;  // width of the picture of the patches
 
 std::string Legend(double y) {
   std::string svg;
   for (size_t c = 0; c < 3; ++c) {
-    svg += SvgText(kRightPx - 130.0 + 55.0 * static_cast<double>(c), y, "start", kNames[c],
+    svg += SvgText(kRightPx - 130.0 + 55.0 * static_cast<double>(c), y, "start", kColourNames[c],
                    kColours[c]);
   }
   return svg;
@@ -75,7 +75,7 @@ std::string LinearityPlot(const ResponseFit& fit, double tolerance) {
       kLeftPx + 8.0, measured.At(white) - 6.0, "start",
       fmt::format("from {:.0f} DN on readings do not count; grey: saturated", fit.white_dn));
   below += SvgLine(x.At(white), percent.begin_px, x.At(white), percent.end_px, kDashed);
-  return SvgFile(kWidthPx, 820, svg + below);
+  return SvgFile(kPlotWidthPx, 820, svg + below);
 }
 
 std::string TransferPlot(const PhotonTransfer& transfer) {
@@ -112,7 +112,7 @@ std::string TransferPlot(const PhotonTransfer& transfer) {
                              transfer.read_noise_dn / transfer.gain_dn_per_electron));
   svg += SvgText(kLeftPx + 20.0, y.end_px + 24.0, "start",
                  fmt::format("gain {:.4f} DN per electron", transfer.gain_dn_per_electron));
-  return SvgFile(kWidthPx, 510, svg);
+  return SvgFile(kPlotWidthPx, 510, svg);
 }
 
 void DrawLine(Rgb8& picture, const Eigen::Vector2d& from, const Eigen::Vector2d& to,

@@ -13,7 +13,7 @@
 namespace sateen::cli {
 namespace {
 
-constexpr int kPanelPx = 900;
+constexpr int kSpherePanelPx = 900;
 constexpr double kPanelRadii = 1.12;  // half a panel, in radii of its sphere
 constexpr int kFraction = 4;          // binary digits of the coordinates of antialiased lines
 constexpr double kPolarRadiusPx = 380.0;
@@ -76,13 +76,13 @@ Rgb8 AsRgb8(const cv::Mat3b& mat) {
 Rgb8 SpherePanel(const SpheresCalibration& result, const cv::Mat3b& shown, size_t index) {
   const Sphere& sphere = result.spheres[index];
   const double half = kPanelRadii * sphere.outline.radius_px;
-  const double scale = kPanelPx / (2.0 * half);
+  const double scale = kSpherePanelPx / (2.0 * half);
   const Eigen::Vector2d corner = sphere.outline.center_px - Eigen::Vector2d(half, half);
   const cv::Matx23d panel_from_picture(scale, 0.0, -scale * corner.x(), 0.0, scale,
                                        -scale * corner.y());
   cv::Mat3b panel;
-  cv::warpAffine(shown, panel, panel_from_picture, cv::Size(kPanelPx, kPanelPx), cv::INTER_LINEAR,
-                 cv::BORDER_CONSTANT, cv::Scalar(96, 96, 96));
+  cv::warpAffine(shown, panel, panel_from_picture, cv::Size(kSpherePanelPx, kSpherePanelPx),
+                 cv::INTER_LINEAR, cv::BORDER_CONSTANT, cv::Scalar(96, 96, 96));
   std::vector<cv::Point> rim;
   for (const Eigen::Vector2d& px : sphere.rim) {
     rim.push_back(Fixed(scale * (px - corner)));
@@ -109,8 +109,8 @@ Rgb8 SpherePanel(const SpheresCalibration& result, const cv::Mat3b& shown, size_
 
 // The zenith in the middle, x to the right, y up, the horizon as the outermost circle.
 Rgb8 PolarPlot(const SpheresCalibration& result) {
-  cv::Mat3b plot(kPanelPx, kPanelPx, cv::Vec3b(255, 255, 255));
-  const Eigen::Vector2d middle(kPanelPx / 2.0, kPanelPx / 2.0);
+  cv::Mat3b plot(kSpherePanelPx, kSpherePanelPx, cv::Vec3b(255, 255, 255));
+  const Eigen::Vector2d middle(kSpherePanelPx / 2.0, kSpherePanelPx / 2.0);
   const auto place = [&](double elevation_deg, double azimuth_deg) -> Eigen::Vector2d {
     const double radius = kPolarRadiusPx * (90.0 - elevation_deg) / 90.0;
     const double angle = azimuth_deg * kRadPerDeg;
@@ -135,8 +135,8 @@ Rgb8 PolarPlot(const SpheresCalibration& result) {
     Text(plot, std::to_string(k + 1), at + Eigen::Vector2d(8.0, -8.0), 0.55, kInk);
   }
   Text(plot, "lights by elevation (rings) and azimuth (rays), degrees", {14.0, 20.0}, 0.55, kInk);
-  Text(plot, "blue: direction, red: position seen from the table's origin", {14.0, kPanelPx - 18.0},
-       0.5, kInk);
+  Text(plot, "blue: direction, red: position seen from the table's origin",
+       {14.0, kSpherePanelPx - 18.0}, 0.5, kInk);
   return AsRgb8(plot);
 }
 

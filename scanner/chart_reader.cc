@@ -19,7 +19,7 @@ constexpr double kRead = 0.6;          // of a patch's side
 constexpr double kBrightShare = 0.02;  // of the picture: the white patch and more
 constexpr float kWellBelowWhite = 0.5F;
 constexpr float kBelowWhite = 0.9F;
-constexpr size_t kFewestSites = 400;  // of a patch: a hundred red ones
+constexpr size_t kFewestPatchSites = 400;  // of a patch: a hundred red ones
 
 // Where in the mosaic the sites of a patch are.
 struct PatchPlaces {
@@ -185,13 +185,13 @@ class ChartReader {
     capture_.pose = *pose;
     for (const ChartPatch& patch : chart_.patches) {
       places_.push_back(PlacesOf(patch));
-      if (places_.back().index.size() < kFewestSites) {
+      if (places_.back().index.size() < kFewestPatchSites) {
         return Fail(
             ErrorCode::kBadData,
             "{}: the middle of patch '{}' has {} sites; need at least {}: use larger patches "
             "or a camera that sees more",
             files_[frame].file.path.string(), patch.name, places_.back().index.size(),
-            kFewestSites);
+            kFewestPatchSites);
       }
     }
     return {};
