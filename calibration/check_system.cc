@@ -153,7 +153,7 @@ CheckSystem::Normal CheckSystem::NormalOf(size_t sheet, size_t light, const RigC
 CheckSystem::Wanted CheckSystem::WantedOf(size_t light, bool moved, bool turned, bool camera,
                                           bool sheet) const {
   Wanted wanted = {};
-  const bool has_axis = rig_.lights[light].model == LightModel::kLed;
+  const bool has_axis = IsLed(rig_.lights[light].model);
   for (int local = 0; local < kLocal; ++local) {
     bool is_wanted = sheet;
     if (local < kSheetAt) {
