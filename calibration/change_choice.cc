@@ -1,6 +1,7 @@
 #include "calibration/change_choice.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <utility>
 
@@ -61,6 +62,12 @@ Result<ChangeChoice> ChooseChange(const CheckSystem& system, size_t lights, size
   }
   if (Status status = task.CheckCancelled(); !status) {
     return tl::unexpected(status.error());
+  }
+  if (!std::isfinite(least)) {
+    return Fail(
+        ErrorCode::kDegenerate,
+        "no explanation of the sheets has a finite misfit; need readings with noise, as of a "
+        "camera");
   }
   return best;
 }

@@ -39,8 +39,9 @@ class ChartSearch {
       : cells_(cells), camera_(camera), light_(light) {
     for (const ChartPatch& patch : chart.patches) {
       for (int i = 0; i < kPlaces * kPlaces; ++i) {
+        const int row = i / kPlaces;
         const Eigen::Vector2d offset((i % kPlaces + 0.5) / kPlaces - 0.5,
-                                     (static_cast<double>(i / kPlaces) + 0.5) / kPlaces - 0.5);
+                                     (row + 0.5) / kPlaces - 0.5);
         places_.push_back({patch.center_mm + kCovered * chart.patch_mm * offset,
                            std::log(patch.reflectance_rgb.mean())});
       }
@@ -108,9 +109,10 @@ Candidate Refine(ChartSearch& search, Candidate best, double& misfit) {
   while (shift_mm > 0.5 * kFinestShiftMm) {
     Candidate next = best;
     for (int i = 0; i < 27; ++i) {
+      const int along_y = i / 3 % 3 - 1;
+      const int turned = i / 9 - 1;
       const Candidate candidate =
-          best + Candidate((i % 3 - 1) * shift_mm, static_cast<double>(i / 3 % 3 - 1) * shift_mm,
-                           static_cast<double>(i / 9 - 1) * turn_rad);
+          best + Candidate((i % 3 - 1) * shift_mm, along_y * shift_mm, turned * turn_rad);
       const double here = search.Misfit(candidate);
       if (here < misfit) {
         misfit = here;

@@ -71,6 +71,7 @@ inline std::pair<Eigen::Vector3d, Eigen::Vector3d> AcrossAxis(const Eigen::Vecto
 inline Light ChangedLight(const Light& light, const LightChange& change) {
   Light now = light;
   now.position_mm += change.moved_mm;
+  now.field.origin_mm += change.moved_mm.head<2>();  // its gains go with the lamp
   const auto [a, b] = AcrossAxis(light.axis);
   now.axis = (light.axis + change.turned_rad[0] * a + change.turned_rad[1] * b).normalized();
   now.flux_rgb.array() *= change.log_flux.array().exp();

@@ -179,8 +179,8 @@ Result<Highlight> FindHighlight(const Image<float>& gray, const Sphere& sphere,
   SphereCrop crop = CropOf(gray, sphere);
   const auto middle = crop.values.begin() + static_cast<std::ptrdiff_t>(crop.values.size() / 2);
   std::ranges::nth_element(crop.values, middle);
-  const double median = *middle;
-  const double peak = *std::max_element(middle, crop.values.end());
+  const auto median = static_cast<double>(*middle);
+  const auto peak = static_cast<double>(*std::max_element(middle, crop.values.end()));
   if (!(peak - median >= options.least_rise)) {
     return Fail(ErrorCode::kDegenerate,
                 "{}: no highlight in the sphere at ({:.0f}, {:.0f}) px: its brightest place has "

@@ -77,7 +77,7 @@ std::vector<GradientEdge> GradientEdges(const Image<float>& small) {
       const float here = strength.At(x, y);
       if (here >= least && here >= strength.At(x + dx, y + dy) &&
           here >= strength.At(x - dx, y - dy)) {
-        edges.push_back({{x, y}, g, here});
+        edges.push_back({{x, y}, g, static_cast<double>(here)});
       }
     }
   }

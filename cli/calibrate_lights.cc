@@ -24,6 +24,8 @@ namespace fs = std::filesystem;
 constexpr double kPoorDirectionDeg = 0.02;  // above which tilted sheets are asked for
 constexpr double kPoorPositionMm = 0.3;
 constexpr double kManyLeftOut = 0.1;  // share of the samples
+constexpr double kOneLamp =
+    0.25;  // of the distance between two lights: fitted closer, they are one
 constexpr int kResidualPanelPx = 240;
 constexpr int kResidualColumns = 5;
 constexpr float kPercent = 100.0F;
@@ -60,9 +62,7 @@ class LightsCalibrator {
  private:
   Status ReadSheets() {
     ReadSheetOptions options;
-    if (!args_.rough_rig.empty()) {
-      options.rig_file = args_.rough_rig;
-    }
+    options.rig_file = RigFileToBeginWith(args_.rough_rig, args_.output);
     if (Status status = ReadBorder(options); !status) {
       return status;
     }
@@ -170,10 +170,13 @@ class LightsCalibrator {
     };
     for (size_t k = 0; k < rough.size(); ++k) {
       const size_t other = nearest(k);
-      if (other != k && nearest(other) != other) {
+      const double apart_mm = (rough[k].position_mm - rough[other].position_mm).norm();
+      const double fitted_apart_mm =
+          (result_.rig.lights[k].position_mm - result_.rig.lights[other].position_mm).norm();
+      if (other != k && (nearest(other) != other || fitted_apart_mm < kOneLamp * apart_mm)) {
         return Fail(ErrorCode::kBadData,
                     "the frame of light '{}' is lit from where light '{}' is expected, {:.0f} mm "
-                    "from its own place: are frames or cables swapped?",
+                    "from its own place: are frames or cables swapped, or one frame there twice?",
                     rough[k].name, rough[other].name, result_.lights[k].moved_mm);
       }
     }
@@ -326,7 +329,8 @@ void AddCalibrateLights(CLI::App& calibrate, CalibrateLightsArgs& args) {
                 "Find poses by the border also where sessions have table_from_sheet")
       ->needs(border);
   cmd->add_option("--rig", args.rough_rig,
-                  "Rough rig: camera, and lights to within some 50 mm; the session's own");
+                  "Rough rig: camera, and lights to within some 50 mm; default: what is at -o, or "
+                  "else the session's own");
   cmd->add_option("--model", args.highest_rung,
                   "Highest rung of the model ladder: near, led or led+field")
       ->check(CLI::IsMember({"near", "led", "led+field"}))

@@ -77,9 +77,7 @@ Result<ResponseCalibration> Calibrate(const CalibrateResponseArgs& args, const T
     return tl::unexpected(chart_hash.error());
   }
   ReadChartOptions options{.find = args.find};
-  if (!args.rig.empty()) {
-    options.rig_file = args.rig;
-  }
+  options.rig_file = RigFileToBeginWith(args.rig, args.output);
   Result<ChartCapture> capture = ReadChart(args.chart, *chart, options, task);
   if (!capture) {
     return tl::unexpected(capture.error());
@@ -141,7 +139,8 @@ void AddCalibrateResponse(CLI::App& calibrate, CalibrateResponseArgs& args) {
   cmd->add_option("-o,--output", args.output, "Rig file to write; a former one is kept as a copy")
       ->required();
   cmd->add_option("--rig", args.rig,
-                  "Rig to start from: camera with its pose, lights; the session's own");
+                  "Rig to start from: camera with its pose, lights; default: what is at -o, or "
+                  "else the session's own");
   cmd->add_option("--tolerance", args.fit.linearity.tolerance,
                   "Of proportionality, for the linear range; above 0 and up to 0.2")
       ->capture_default_str();

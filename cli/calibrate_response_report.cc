@@ -8,7 +8,7 @@
 namespace sateen::cli {
 namespace {
 
-constexpr std::array<std::string_view, 3> kColourNames = {"red", "green", "blue"};
+constexpr std::array<std::string_view, 3> kChannelNames = {"red", "green", "blue"};
 
 nlohmann::json ListOf(const Eigen::Vector3d& v) { return {v[0], v[1], v[2]}; }
 
@@ -59,7 +59,7 @@ std::string LinearityText(const ResponseCalibration& result) {
   for (size_t c = 0; c < 3; ++c) {
     const ChannelLinearity& channel = result.fit.linearity.rgb[c];
     text += fmt::format(
-        "  {:<8} {:>11.0f} {:>8.0f}{:<4} {:>8}\n", kColourNames[c], channel.linear_from_dn,
+        "  {:<8} {:>11.0f} {:>8.0f}{:<4} {:>8}\n", kChannelNames[c], channel.linear_from_dn,
         channel.linear_to_dn, channel.departs ? "" : " +",
         channel.saturation_dn ? fmt::format("{:.0f}", *channel.saturation_dn) : "not seen");
   }
@@ -137,7 +137,7 @@ std::string JsonReport(const CalibrateResponseArgs& args, const ResponseCalibrat
                            {"lights", LightsJson(result)},
                            {"left_out", nlohmann::json::array()}};
   for (size_t c = 0; c < 3; ++c) {
-    report["linearity"][kColourNames[c]] = LinearityJson(fit.linearity.rgb[c]);
+    report["linearity"][kChannelNames[c]] = LinearityJson(fit.linearity.rgb[c]);
   }
   for (const UnevenPatch& uneven : fit.uneven) {
     report["left_out"].push_back({{"light", result.rig.lights[uneven.light].name},

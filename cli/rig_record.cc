@@ -25,6 +25,9 @@ void RecordCalibration(Rig& rig, std::string_view kind, nlohmann::json figures,
   if (!rig.calibration_json.empty()) {
     all = nlohmann::json::parse(rig.calibration_json, nullptr, /*allow_exceptions=*/false);
   }
+  for (const char* key : {"output", "former_rig", "pictures"}) {
+    figures.erase(key);  // names of one machine, and of one moment
+  }
   figures["date"] = TimeAs("%Y-%m-%dT%H:%M:%SZ");
   figures["version"] = SATEEN_VERSION;
   figures["inputs"] = sha256_of_input;
@@ -40,6 +43,16 @@ Result<Rig> RigToBeginWith(const std::filesystem::path& rig_file,
     return Rig();
   }
   return ReadRig(path);
+}
+
+std::optional<std::filesystem::path> RigFileToBeginWith(const std::filesystem::path& rig_file,
+                                                        const std::filesystem::path& output) {
+  const std::filesystem::path& path = rig_file.empty() ? output : rig_file;
+  std::error_code error;
+  if (rig_file.empty() && !std::filesystem::exists(output, error)) {
+    return std::nullopt;
+  }
+  return path;
 }
 
 nlohmann::json RecordedFigure(const Rig& rig, const std::string& kind, const std::string& figure) {
@@ -78,6 +91,9 @@ Result<std::filesystem::path> ReplaceFile(const std::filesystem::path& path,
 }
 
 Result<std::filesystem::path> ReplaceRig(const std::filesystem::path& path, const Rig& rig) {
+  if (Status status = rig.Validate(path.string()); !status) {
+    return tl::unexpected(status.error());
+  }
   return ReplaceFile(path, RigToJson(rig));
 }
 

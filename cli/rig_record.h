@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -20,6 +21,10 @@ void RecordCalibration(Rig& rig, std::string_view kind, nlohmann::json figures,
 // already; without either a rig of nothing.
 [[nodiscard]] Result<Rig> RigToBeginWith(const std::filesystem::path& rig_file,
                                          const std::filesystem::path& output);
+
+// Its file, for what reads sessions: nothing where neither is there, and the session's own rig counts.
+[[nodiscard]] std::optional<std::filesystem::path> RigFileToBeginWith(
+    const std::filesystem::path& rig_file, const std::filesystem::path& output);
 
 // One value of what RecordCalibration() recorded; null where there is none.
 [[nodiscard]] nlohmann::json RecordedFigure(const Rig& rig, const std::string& kind,

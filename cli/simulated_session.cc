@@ -154,7 +154,7 @@ class SessionWriter {
     folder_.Retire(stem + (is_raw ? ".exr" : ".dng"));
     const std::string written = stem + (is_raw ? ".dng" : ".exr");
     const std::filesystem::path staged = folder_.Stage(written);
-    const Status status =
+    Status status =
         is_raw ? WriteRaw(staged, radiance, light, take, index) : WriteExr(staged, radiance);
     if (!status) {
       return status;

@@ -54,7 +54,8 @@ Status AssignFrames(const fs::path& dir, CapturePlan& plan) {
     if (light == lights.end()) {
       return Fail(ErrorCode::kBadData,
                   "{}: frame {} is of light '{}', which the rig has not; its lights are {}", where,
-                  frame.file, frame.light, NamesOf(lights));
+                  frame.file, frame.light,
+                  lights.empty() ? "none: give it rough positions by the ruler" : NamesOf(lights));
     }
     std::optional<FrameFile>& slot = plan.lit[static_cast<size_t>(light - lights.begin())];
     if (slot) {

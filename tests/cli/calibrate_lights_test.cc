@@ -190,6 +190,39 @@ TEST_F(CalibrateLightsCommand, SwappedFramesAreFoundAndNothingIsWritten) {
   EXPECT_FALSE(fs::exists(Path("swapped-lights")));
 }
 
+// One lamp's frame in two places: its own light is right, the other is that lamp again.
+TEST_F(CalibrateLightsCommand, AFrameThatIsThereTwiceIsFound) {
+  const fs::path twice = CopyOfFlat("twice");
+  std::ifstream file(twice / "session.json");
+  nlohmann::json session = nlohmann::json::parse(file);
+  for (const char* key : {"file", "sha256"}) {
+    session["frames"][4][key] = session["frames"][3][key];
+  }
+  WriteText(twice / "session.json", session.dump());
+
+  const RunResult run = CalibrateLights(
+      {"--sheet", twice.string(), "--rig", Path("rough.json"), "-o", Path("twice.json")});
+
+  EXPECT_EQ(run.exit_status, 3);
+  EXPECT_THAT(run.log, HasSubstr("the frame of light 'led-4' is lit from where light 'led-3' is"));
+  EXPECT_FALSE(fs::exists(Path("twice.json")));
+}
+
+// What lens, pose and response wrote at -o stays: the session's own rig is older.
+TEST_F(CalibrateLightsCommand, TheRigAtTheOutputIsWhatItAddsTo) {
+  fs::copy_file(Path("rough.json"), Path("grown.json"));
+  Rig grown = ReadRig(Path("grown.json")).value();
+  grown.calibration_json = R"({"lens": {"board": "mine"}})";
+  WriteText(Path("grown.json"), RigToJson(grown));
+
+  const RunResult run = CalibrateLights({"--sheet", Path("flat"), "-o", Path("grown.json")});
+
+  ASSERT_EQ(run.exit_status, 0) << run.log;
+  const Rig after = ReadRig(Path("grown.json")).value();
+  EXPECT_THAT(after.calibration_json, HasSubstr("mine"));
+  EXPECT_THAT(after.calibration_json, HasSubstr("lights"));
+}
+
 TEST_F(CalibrateLightsCommand, BadSheetsAreNamedWithTheirFault) {
   const auto log_of = [&](const std::string& sheet) {
     const RunResult run = CalibrateLights(
