@@ -36,7 +36,9 @@ std::optional<double> WidthOf(const Image<uint8_t>& grey, const Eigen::Vector2d&
   }
   const Eigen::Vector2d across = Eigen::Vector2d(-along.y(), along.x()).normalized();
   std::vector<double> profile;
-  for (double t = -reach_px; t <= reach_px; t += kStepPx) {
+  const int steps = static_cast<int>(std::floor(2.0 * reach_px / kStepPx));
+  for (int step = 0; step <= steps; ++step) {
+    const double t = -reach_px + step * kStepPx;
     double sum = 0.0;
     for (const double share : kAlong) {
       const auto level = LevelAt(grey, a + (0.5 + share) * along + t * across);

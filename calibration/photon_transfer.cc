@@ -23,6 +23,7 @@ struct Line {
 Line FitLine(const std::vector<const TransferPoint*>& points) {
   Line line;
   std::vector<double> expected;
+  expected.reserve(points.size());
   for (const TransferPoint* point : points) {
     expected.push_back(std::max(point->variance_dn2, kRounding));
   }

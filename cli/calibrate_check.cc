@@ -28,6 +28,7 @@ double AmbientPercent(const Sheet& sheet) {
   for (const std::vector<SheetSample>& samples : sheet.samples) {
     for (Eigen::Index c = 0; c < 3 && !samples.empty(); ++c) {
       std::vector<double> radiances;
+      radiances.reserve(samples.size());
       for (const SheetSample& sample : samples) {
         radiances.push_back(sample.radiance_rgb[c]);
       }

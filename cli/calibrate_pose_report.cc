@@ -89,7 +89,9 @@ Status DrawPose(const PoseCalibration& result, double thickness_mm) {
   const auto on_print = [&](double x, double y, double z) {
     return Eigen::Vector3d(x, y, z + thickness_mm);
   };
-  for (double at = -kReachMm; at <= kReachMm; at += kGridMm) {
+  const int lines = static_cast<int>(2.0 * kReachMm / kGridMm);
+  for (int line = 0; line <= lines; ++line) {
+    const double at = -kReachMm + line * kGridMm;
     pen.Draw(on_print(at, -kReachMm, 0), on_print(at, kReachMm, 0), kGridInk, 1);
     pen.Draw(on_print(-kReachMm, at, 0), on_print(kReachMm, at, 0), kGridInk, 1);
   }

@@ -102,8 +102,11 @@ std::string TransferPlot(const PhotonTransfer& transfer) {
     svg += SvgDots(x, y, points, kColours[c], 4.0);
   }
   Points line;
-  for (double mean = 1.0; mean <= x.last; mean *= 1.1) {
+  constexpr double kStep = 1.1;
+  double mean = 1.0;
+  while (mean <= x.last) {
     line.emplace_back(mean, read + transfer.gain_dn_per_electron * mean);
+    mean *= kStep;
   }
   svg += SvgCurve(x, y, line, "stroke=\"#222222\"");
   svg += SvgLine(x.begin_px, y.At(read), x.end_px, y.At(read), kDashed);

@@ -25,13 +25,13 @@ struct ExposureRecord {
 };
 
 struct SceneFile {
-  std::string title;
-  SessionKind kind = SessionKind::kFabric;
-  Scene scene;
-  Sensor sensor;
-  ExposureRecord exposure;
-  std::vector<std::filesystem::path> inputs;           // the scene file and the rig
   std::optional<Eigen::Isometry3d> table_from_target;  // of a sheet, and of what is printed
+  Scene scene;
+  std::vector<std::filesystem::path> inputs;  // the scene file and the rig
+  std::string title;
+  ExposureRecord exposure;
+  Sensor sensor;
+  SessionKind kind = SessionKind::kFabric;
   bool target_is_printed = false;  // so that frames tell its pose, and their record need not
 };
 

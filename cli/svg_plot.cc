@@ -18,8 +18,9 @@ std::vector<double> PlotAxis::Ticks() const {
   constexpr double kRounding = 1e-9;
   std::vector<double> ticks;
   if (is_log) {
-    for (double power = std::ceil(std::log10(first) - kRounding);
-         power <= std::log10(last) + kRounding; power += 1.0) {
+    const int from = static_cast<int>(std::ceil(std::log10(first) - kRounding));
+    const int to = static_cast<int>(std::floor(std::log10(last) + kRounding));
+    for (int power = from; power <= to; ++power) {
       ticks.push_back(std::pow(10.0, power));
     }
     return ticks;
