@@ -183,7 +183,8 @@ Image<uint8_t> PageImage(const Page& page, double dpi) {
   const int stride = cairo_image_surface_get_stride(surface.get());
   for (int y = 0; y < grey.height; ++y) {
     for (int x = 0; x < grey.width; ++x) {
-      grey.At(x, y) = data[static_cast<ptrdiff_t>(y) * stride + 4 * x];  // black and white alone
+      grey.At(x, y) =
+          data[static_cast<ptrdiff_t>(y) * stride + ptrdiff_t{4} * x];  // black and white alone
     }
   }
   return grey;

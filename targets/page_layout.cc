@@ -11,17 +11,17 @@
 namespace sateen {
 namespace {
 
-constexpr double kMarginMm = 5.0;   // which printers leave white
-constexpr double kFooterMm = 14.0;  // ruler and text, within the margin
+constexpr double kPageMarginMm = 5.0;  // which printers leave white
+constexpr double kFooterMm = 14.0;     // ruler and text, within the margin
 constexpr double kSlackMm = 1e-6;
-constexpr std::array kPapers = {"letter", "A4", "A3", "A2"};
+constexpr std::array kPapersBySize = {"letter", "A4", "A3", "A2"};
 constexpr std::array kRulersMm = {100.0, 50.0};
 
 // What a print may take of a paper.
 Eigen::Vector2d RoomMm(const Eigen::Vector2d& paper_mm, bool is_sheet) {
   return is_sheet ? paper_mm
-                  : Eigen::Vector2d(paper_mm.x() - 2.0 * kMarginMm,
-                                    paper_mm.y() - 2.0 * kMarginMm - kFooterMm);
+                  : Eigen::Vector2d(paper_mm.x() - 2.0 * kPageMarginMm,
+                                    paper_mm.y() - 2.0 * kPageMarginMm - kFooterMm);
 }
 
 // The paper, turned so that the print fits; as it is where that does.
@@ -48,7 +48,7 @@ double LargestShare(const Eigen::Vector2d& paper_mm, const Print& print) {
 std::string WhatFits(const Eigen::Vector2d& paper_mm, const Print& print,
                      const std::optional<BoardSpec>& board) {
   std::vector<std::string> fits;
-  for (const char* name : kPapers) {
+  for (const char* name : kPapersBySize) {
     if (FittingPaper(PaperSizeMm(name).value(), print, !board)) {
       fits.emplace_back(name);
     }
@@ -107,7 +107,7 @@ Result<Page> LayOutPage(std::string_view spec, std::string_view paper) {
   const double below_mm = turned->y() - page.center_mm.y() - 0.5 * page.print.SizeMm().y();
   if (below_mm + kSlackMm >= kFooterMm) {
     const auto* const ruler = std::ranges::find_if(
-        kRulersMm, [&](double length) { return length <= turned->x() - 2.0 * kMarginMm; });
+        kRulersMm, [&](double length) { return length <= turned->x() - 2.0 * kPageMarginMm; });
     page.ruler_mm = ruler != kRulersMm.end() ? *ruler : 0.0;
   }
   return page;

@@ -50,8 +50,9 @@ Print::Print(const Eigen::Vector2d& size_mm, std::vector<Eigen::AlignedBox2d> bl
     const Eigen::Vector2i last = BinOf(black_mm_[i].max());
     for (int row = first.y(); row <= last.y(); ++row) {
       for (int column = first.x(); column <= last.x(); ++column) {
-        boxes_of_bin_[static_cast<size_t>(row * bins_.x() + column)].push_back(
-            static_cast<uint32_t>(i));
+        boxes_of_bin_[static_cast<size_t>(row) * static_cast<size_t>(bins_.x()) +
+                      static_cast<size_t>(column)]
+            .push_back(static_cast<uint32_t>(i));
       }
     }
   }
@@ -68,7 +69,8 @@ bool Print::IsBlackAt(const Eigen::Vector2d& at_mm) const {
     return false;
   }
   const Eigen::Vector2i bin = BinOf(at_mm);
-  const auto& boxes = boxes_of_bin_[static_cast<size_t>(bin.y() * bins_.x() + bin.x())];
+  const auto& boxes = boxes_of_bin_[static_cast<size_t>(bin.y()) * static_cast<size_t>(bins_.x()) +
+                                    static_cast<size_t>(bin.x())];
   return std::any_of(boxes.begin(), boxes.end(), [&](uint32_t i) {
     return (at_mm.array() >= black_mm_[i].min().array()).all() &&
            (at_mm.array() < black_mm_[i].max().array()).all();
