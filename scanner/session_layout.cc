@@ -43,7 +43,7 @@ Status AssignFrames(const fs::path& dir, CapturePlan& plan) {
   const std::string where = (dir / "session.json").string();
   plan.lit.resize(plan.rig.lights.size());
   for (const SessionFrame& frame : plan.session->frames) {
-    FrameFile file{dir / frame.file, frame.Exposure(), frame.sha256, plan.rig.response};
+    FrameFile file{dir / frame.file, frame.Exposure(), frame.sha256};
     if (frame.role == FrameRole::kDark) {
       plan.dark.push_back(std::move(file));
       continue;
@@ -54,17 +54,13 @@ Status AssignFrames(const fs::path& dir, CapturePlan& plan) {
     if (light == lights.end()) {
       return Fail(ErrorCode::kBadData,
                   "{}: frame {} is of light '{}', which the rig has not; its lights are {}", where,
-                  frame.file, frame.light,
-                  lights.empty() ? "none: give it rough positions by the ruler" : NamesOf(lights));
+                  frame.file, frame.light, NamesOf(lights));
     }
     std::optional<FrameFile>& slot = plan.lit[static_cast<size_t>(light - lights.begin())];
     if (slot) {
       return Fail(ErrorCode::kBadData,
-                  "{}: frames {} and {} are both of light '{}'; need one frame for each light{}",
-                  where, slot->path.lexically_relative(dir).string(), frame.file, frame.light,
-                  plan.session->kind == SessionKind::kChart
-                      ? "; the series of a chart is for sateen calibrate response"
-                      : "");
+                  "{}: frames {} and {} are both of light '{}'; need one frame for each light",
+                  where, slot->path.lexically_relative(dir).string(), frame.file, frame.light);
     }
     slot = std::move(file);
   }
@@ -73,7 +69,7 @@ Status AssignFrames(const fs::path& dir, CapturePlan& plan) {
 
 }  // namespace
 
-Result<CapturePlan> PlanSessionRig(const fs::path& dir, const ReadCaptureOptions& options) {
+Result<CapturePlan> PlanSession(const fs::path& dir, const ReadCaptureOptions& options) {
   CapturePlan plan;
   plan.layout = "session";
   const Result<Session> session = ReadSession(dir);
@@ -92,21 +88,13 @@ Result<CapturePlan> PlanSessionRig(const fs::path& dir, const ReadCaptureOptions
   if (!rig) {
     return tl::unexpected(rig.error());
   }
-  return plan;
-}
-
-Result<CapturePlan> PlanSession(const fs::path& dir, const ReadCaptureOptions& options) {
-  Result<CapturePlan> plan = PlanSessionRig(dir, options);
-  if (!plan) {
-    return plan;
-  }
-  if (const Status status = AssignFrames(dir, *plan); !status) {
+  if (const Status status = AssignFrames(dir, plan); !status) {
     return tl::unexpected(status.error());
   }
-  if (plan->session->mask) {
-    plan->mask = dir / *plan->session->mask;
+  if (session->mask) {
+    plan.mask = dir / *session->mask;
   }
-  plan->truth = FindSessionTruth(dir);
+  plan.truth = FindSessionTruth(dir);
   return plan;
 }
 

@@ -26,11 +26,10 @@ class Generator {
  public:
   explicit Generator(unsigned seed) : rng_(seed) {}
 
-  // With lights of one rung up to `highest`.
-  RandomCase Make(LightModel highest) {
+  RandomCase Make() {
     const ImageSize size{Int(1, 70), Int(1, 9)};
     RandomCase random;
-    const auto model = static_cast<LightModel>(Int(0, static_cast<int>(highest)));
+    const auto model = static_cast<LightModel>(Int(0, 2));
     random.rig = RingRig(size, model);
     random.rig.lights = RandomLights(Int(3, 24), model);
     const ReliefScene scene{.shape = ReliefShape::kRipple,
@@ -72,13 +71,6 @@ class Generator {
                         .axis = -(up + Eigen::Vector3d(Real(-1, 1), Real(-1, 1), 0)).normalized(),
                         .anisotropy = std::max(0.0, Real(-1.0, 4.0)),
                         .flux_rgb = {Real(0.1, 1.0), Real(0.1, 1.0), Real(0.1, 1.0)}});
-      if (model == LightModel::kLedField) {
-        lights.back().field =
-            LensRings({Real(-50, 50), Real(-50, 50)}, Real(-0.3, 0.3), Real(80, 200));
-        if (k % 3 == 1) {
-          lights.back().model = LightModel::kLed;  // beside those that have one
-        }
-      }
     }
     return lights;
   }
@@ -121,11 +113,11 @@ void ExpectSameResidual(const NormalField& fast, const NormalField& reference) {
   }
 }
 
-void ExpectAgreement(int first_seed, int count, LightModel highest) {
+TEST(FastKernel, AgreesWithTheReferenceOnRandomStacks) {
   int64_t compared = 0;
-  for (int seed = first_seed; seed < first_seed + count; ++seed) {
+  for (int seed = 0; seed < CaseCount(); ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
-    const RandomCase random = Generator(static_cast<unsigned>(seed)).Make(highest);
+    const RandomCase random = Generator(static_cast<unsigned>(seed)).Make();
     const auto solve = [&](Backend backend) {
       LambertianOptions options = random.options;
       options.backend = backend;
@@ -154,15 +146,7 @@ void ExpectAgreement(int first_seed, int count, LightModel highest) {
     ExpectSameResidual(*fast, *reference);
     compared += angle.count;
   }
-  EXPECT_GT(compared, 100 * count);  // that the cases are not all refused
-}
-
-TEST(FastKernel, AgreesWithTheReferenceOnRandomStacks) {
-  ExpectAgreement(0, CaseCount(), LightModel::kLed);
-}
-
-TEST(FastKernel, AgreesWithTheReferenceWithFields) {
-  ExpectAgreement(1000, CaseCount() / 4, LightModel::kLedField);
+  EXPECT_GT(compared, 100 * CaseCount());  // that the cases are not all refused
 }
 
 TEST(FastKernel, TellsWhatItWasCompiledFor) { EXPECT_FALSE(KernelInstructionSet().empty()); }
