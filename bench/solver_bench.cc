@@ -62,6 +62,7 @@ BENCHMARK_CAPTURE(BM_Rows, distant, &FastRows::Solve, LightModel::kDistant, 1.0F
 BENCHMARK_CAPTURE(BM_Rows, near, &FastRows::Solve, LightModel::kNear, 1.0F);
 BENCHMARK_CAPTURE(BM_Rows, near_subnormal, &FastRows::Solve, LightModel::kNear, 1e-40F);
 BENCHMARK_CAPTURE(BM_Rows, led, &FastRows::Solve, LightModel::kLed, 1.0F);
+BENCHMARK_CAPTURE(BM_Rows, led_field, &FastRows::Solve, LightModel::kLedField, 1.0F);
 
 void BM_TablePositions(benchmark::State& state) {
   const Rig rig = RingRig(kSize);

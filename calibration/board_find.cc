@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "calibration/chessboard.h"
+#include "calibration/edge_width.h"
 #include "calibration/markers.h"
 #include "calibration/plane_map.h"
 
@@ -11,14 +12,14 @@ namespace sateen {
 namespace {
 
 constexpr size_t kFewestCorners = 6;
-constexpr size_t kFewestMarkers = 3;
-constexpr double kFewestInPlace = 0.9;  // of the markers
-constexpr double kMarkerSlack = 0.35;   // of a square: how far a lens may bend the board
-constexpr size_t kMarkersOfAPatch = 4;  // from which a corner's place is predicted
-constexpr double kPatchSquares = 3.0;   // squares to the farthest of them
-constexpr double kReachOfGap = 0.9;     // between a corner and the markers, read and refined in
-constexpr double kQuadrant = 0.35;      // of the side that CrossingContrast() is given, at most
-constexpr double kCrossing = 0.25;      // of the board's contrast, below which it is no corner
+constexpr size_t kFewestBoardMarkers = 3;
+constexpr double kFewestBoardInPlace = 0.9;  // of the markers
+constexpr double kMarkerSlack = 0.35;        // of a square: how far a lens may bend the board
+constexpr size_t kMarkersOfAPatch = 4;       // from which a corner's place is predicted
+constexpr double kPatchSquares = 3.0;        // squares to the farthest of them
+constexpr double kReachOfGap = 0.9;      // between a corner and the markers, read and refined in
+constexpr double kQuadrantShare = 0.35;  // of the side that CrossingContrast() is given, at most
+constexpr double kCrossing = 0.25;       // of the board's contrast, below which it is no corner
 
 // One marker of the board, seen.
 struct BoardMarker {
@@ -35,7 +36,7 @@ std::vector<BoardMarker> BoardMarkersOf(const std::vector<MarkerView>& seen,
   markers.reserve(seen.size());
   for (const MarkerView& marker : seen) {
     if (static_cast<size_t>(marker.id) < centers.size()) {
-      const Eigen::Vector3d c = centers[static_cast<size_t>(marker.id)];
+      const Eigen::Vector3d& c = centers[static_cast<size_t>(marker.id)];
       markers.push_back({.center_mm = c,
                          .corners_mm = {c + Eigen::Vector3d(-half, half, 0.0),
                                         c + Eigen::Vector3d(half, half, 0.0),
@@ -114,6 +115,7 @@ std::optional<PlaneMap> PatchAt(const std::vector<BoardMarker>& markers,
 // the sign that the colours of the squares say.
 BoardView CornersBeside(const Image<uint8_t>& grey, const BoardSpec& spec,
                         const std::vector<BoardMarker>& markers) {
+  const Image<uint8_t> smooth = SmoothedForCorners(grey);
   struct Candidate {
     int id;
     Eigen::Vector2d corner_px;
@@ -130,10 +132,10 @@ BoardView CornersBeside(const Image<uint8_t>& grey, const BoardSpec& spec,
       continue;
     }
     const std::optional<double> crossing =
-        CrossingContrast(grey, *map, at_mm.head<2>(), reach_mm / kQuadrant);
+        CrossingContrast(grey, *map, at_mm.head<2>(), reach_mm / kQuadrantShare);
     const Eigen::Vector2d rough = MapPoint(*map, at_mm.head<2>());
     const int window_px = CornerWindowPx(*map, at_mm.head<2>(), reach_mm);
-    const Eigen::Vector2d corner = RefineCorner(grey, rough, window_px);
+    const Eigen::Vector2d corner = RefineCorner(smooth, rough, window_px);
     if (crossing && corner != rough && (corner - rough).norm() <= window_px) {
       const bool dark_first = spec.IsBlack(id % (spec.columns - 1), id / (spec.columns - 1));
       candidates.push_back({id, corner, dark_first ? *crossing : -*crossing});
@@ -156,18 +158,20 @@ BoardView CornersBeside(const Image<uint8_t>& grey, const BoardSpec& spec,
 
 Result<BoardView> FindCharuco(const Image<uint8_t>& grey, const BoardSpec& spec) {
   const std::vector<MarkerView> seen = FindMarkers(grey, spec.dictionary);
-  if (seen.size() < kFewestMarkers) {
+  if (seen.size() < kFewestBoardMarkers) {
     return Fail(ErrorCode::kDegenerate,
                 "{} markers of {} found; need {}: show the board, flat, sharp and evenly lit, and "
                 "name its own dictionary",
-                seen.size(), spec.dictionary, kFewestMarkers);
+                seen.size(), spec.dictionary, kFewestBoardMarkers);
   }
   const std::vector<BoardMarker> markers = InPlace(BoardMarkersOf(seen, spec), spec.square_mm);
-  if (static_cast<double>(markers.size()) < kFewestInPlace * static_cast<double>(seen.size())) {
-    return Fail(ErrorCode::kDegenerate,
-                "{} of {} markers lie where '{}' has them; it is another board, an older pattern "
-                "(':legacy'), or two boards are in view",
-                markers.size(), seen.size(), spec.Text());
+  if (static_cast<double>(markers.size()) <
+      kFewestBoardInPlace * static_cast<double>(seen.size())) {
+    return Fail(
+        ErrorCode::kDegenerate,
+        "{} of {} markers lie where '{}' has them; it is another board, or of the other pattern "
+        "(with ':legacy' or without), or two boards are in view",
+        markers.size(), seen.size(), spec.Text());
   }
   BoardView view = CornersBeside(grey, spec, markers);
   if (view.ids.size() < kFewestCorners || !FitPlaneMap(view.points_mm, view.corners_px)) {
@@ -181,8 +185,12 @@ Result<BoardView> FindCharuco(const Image<uint8_t>& grey, const BoardSpec& spec)
 }  // namespace
 
 Result<BoardView> FindBoard(const Image<uint8_t>& grey, const BoardSpec& spec) {
-  return spec.pattern == BoardPattern::kChessboard ? FindChessboard(grey, spec)
-                                                   : FindCharuco(grey, spec);
+  Result<BoardView> view = spec.pattern == BoardPattern::kChessboard ? FindChessboard(grey, spec)
+                                                                     : FindCharuco(grey, spec);
+  if (view) {
+    view->edge_px = EdgeWidthPx(grey, spec, *view);
+  }
+  return view;
 }
 
 }  // namespace sateen

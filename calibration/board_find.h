@@ -17,6 +17,7 @@ struct BoardView {
   std::vector<Eigen::Vector2d> corners_px = {};  // pixel centres at integers
   std::vector<Eigen::Vector3d> points_mm = {};   // the same corners in the board frame; z = 0
   std::string name = {};                         // of the picture, for messages; may be empty
+  double edge_px = 0.0;                          // EdgeWidthPx(); 0: not known
 };
 
 /// Finds the board in the picture, each corner to some hundredths of a pixel.

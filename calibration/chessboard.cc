@@ -14,7 +14,7 @@ namespace {
 
 constexpr int kWidestForBoardPx = 1600;  // wider pictures are shrunk to find the board in them
 constexpr double kCornerReach = 0.25;    // of a square, about a corner, from which it is refined
-constexpr double kCrossing = 0.7;        // of the board's contrast; a mere edge has half
+constexpr double kBoardCrossing = 0.7;   // of the board's contrast; a mere edge has half
 
 // Every corner to about a pixel, row by row from either end; none if not found.
 std::vector<Eigen::Vector2d> RoughCorners(const Image<uint8_t>& grey, const BoardSpec& spec) {
@@ -26,8 +26,8 @@ std::vector<Eigen::Vector2d> RoughCorners(const Image<uint8_t>& grey, const Boar
   }
   const cv::Size size(spec.columns - 1, spec.rows - 1);
   std::vector<cv::Point2f> found;
-  if (!cv::findChessboardCorners(small, size, found,
-                                 cv::CALIB_CB_NORMALIZE_IMAGE | cv::CALIB_CB_ADAPTIVE_THRESH) &&
+  // The older findChessboardCorners() takes up to 15 s where the board is not there.
+  if (!cv::findChessboardCornersSB(small, size, found, cv::CALIB_CB_NORMALIZE_IMAGE) &&
       !cv::findChessboardCornersSB(small, size, found,
                                    cv::CALIB_CB_NORMALIZE_IMAGE | cv::CALIB_CB_EXHAUSTIVE)) {
     return {};
@@ -72,7 +72,7 @@ bool GoesOn(const Image<uint8_t>& grey, const BoardSpec& spec, const PlaneMap& m
     const Eigen::Vector2d at_mm = {(column - 0.5 * spec.columns) * spec.square_mm,
                                    (0.5 * spec.rows - row) * spec.square_mm};
     const double crossing = CrossingContrast(grey, map, at_mm, spec.square_mm).value_or(0.0);
-    return std::abs(crossing) > kCrossing * contrast ? 1 : 0;
+    return std::abs(crossing) > kBoardCrossing * contrast ? 1 : 0;
   };
   std::array<int, 4> crossings = {};
   for (int row = 1; row < spec.rows; ++row) {
@@ -114,10 +114,11 @@ Result<BoardView> FindChessboard(const Image<uint8_t>& grey, const BoardSpec& sp
                 "the chessboard has more than {} x {} inner corners; correct the numbers",
                 spec.columns - 1, spec.rows - 1);
   }
+  const Image<uint8_t> smooth = SmoothedForCorners(grey);
   for (size_t i = 0; i < corners.size(); ++i) {
     const int window_px =
         CornerWindowPx(*map, view.points_mm[i].head<2>(), kCornerReach * spec.square_mm);
-    view.corners_px[i] = RefineCorner(grey, corners[i], window_px);
+    view.corners_px[i] = RefineCorner(smooth, corners[i], window_px);
   }
   return view;
 }

@@ -7,6 +7,7 @@
 
 #include "calibration/plane_map.h"
 #include "calibration/pose_solve.h"
+#include "calibration/robust_fit.h"
 #include "core/angle.h"
 
 namespace sateen {
@@ -77,12 +78,6 @@ Result<RawLensFit> RawFit(const std::vector<BoardView>& views, const ViewSet& se
   return fit;
 }
 
-double MedianOf(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 // Fits, and leaves out the worst view as long as it is an outlier.
 Result<RawLensFit> FitWithoutOutliers(const std::vector<BoardView>& views, ViewSet& set,
                                       const LensFitOptions& options, LensFit& report) {
@@ -94,7 +89,7 @@ Result<RawLensFit> FitWithoutOutliers(const std::vector<BoardView>& views, ViewS
       return fit;
     }
     const auto worst = std::max_element(fit->rms_px.begin(), fit->rms_px.end());
-    const double limit_px = options.outlier_ratio * MedianOf(fit->rms_px);
+    const double limit_px = options.outlier_ratio * Median(fit->rms_px);
     if (*worst <= std::max(limit_px, kNoOutlierPx)) {
       return fit;
     }
@@ -156,7 +151,9 @@ ViewSet UsableViews(const std::vector<BoardView>& views, LensFit& report) {
   report.views.reserve(views.size());
   for (size_t i = 0; i < views.size(); ++i) {
     const BoardView& view = views[i];
-    report.views.push_back({.name = view.name.empty() ? fmt::format("view {}", i + 1) : view.name});
+    report.views.push_back({.name = view.name.empty() ? fmt::format("view {}", i + 1) : view.name,
+                            .corners = view.ids.size(),
+                            .edge_px = view.edge_px});
     if (view.ids.size() < kFewestCornersOfView || !FitPlaneMap(view.points_mm, view.corners_px)) {
       report.views.back().left_out = fmt::format("{} corners; need {} in more than one row",
                                                  view.ids.size(), kFewestCornersOfView);

@@ -28,6 +28,8 @@ struct LensFitOptions {
 struct LensViewReport {
   std::string name;           // the view's own, or "view 3"
   std::string left_out = {};  // why it is not used; empty where it is
+  size_t corners = 0;         // found
+  double edge_px = 0.0;       // how blurred its edges are, as in BoardView
   double rms_px = 0.0;        // length of the residuals; 0 where the view is left out unfitted
   double held_out_px = 0.0;   // the same by a lens fitted without the view; 0 where not used
   Eigen::Vector3d normal_in_camera = Eigen::Vector3d::Zero();  // of the board, where used

@@ -12,6 +12,28 @@ constexpr double kEnoughSpread = 30.0 * kRadPerDeg;
 constexpr double kEnoughCovered = 0.7;  // of the cells
 constexpr double kFocalSd = 2e-3;       // relative
 constexpr double kHeldOutRatio = 1.5;
+constexpr double kBlurRatio = 2.0;  // of the median
+constexpr double kSharpPx = 1.2;    // an edge width that is never called blurred
+
+void WarnOfBlur(const LensFit& fit, std::vector<std::string>& warnings) {
+  std::vector<double> widths_px;
+  for (const LensViewReport& view : fit.views) {
+    if (view.left_out.empty()) {
+      widths_px.push_back(view.edge_px);
+    }
+  }
+  const auto middle = widths_px.begin() + static_cast<std::ptrdiff_t>(widths_px.size() / 2);
+  std::nth_element(widths_px.begin(), middle, widths_px.end());
+  const double limit_px = std::max(kBlurRatio * *middle, kSharpPx);
+  for (const LensViewReport& view : fit.views) {
+    if (view.left_out.empty() && view.edge_px > limit_px) {
+      warnings.push_back(fmt::format(
+          "{} is blurred: its edges are {:.1f} px wide, those of half the views {:.1f} px or less; "
+          "did board or camera move, or was the board out of focus?",
+          view.name, view.edge_px, *middle));
+    }
+  }
+}
 
 }  // namespace
 
@@ -40,6 +62,7 @@ std::vector<std::string> WarningsOf(const LensFit& fit) {
         "to 40 degrees to the left, right, front and back",
         spread_deg));
   }
+  WarnOfBlur(fit, warnings);
   const Image<int>& cells = fit.coverage;
   std::vector<std::string_view> empty;
   empty.reserve(4);

@@ -3,24 +3,16 @@
 #include <Eigen/Core>
 #include <vector>
 
+#include "calibration/sheet_sample.h"
 #include "core/error.h"
 #include "rig/light.h"
 
 namespace sateen {
 
-// White paper under one light: the mean over one block of pixels.
-struct SheetSample {
-  Eigen::Vector3d point_mm = Eigen::Vector3d::Zero();  // on the sheet, in the table frame
-  Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();   // of the sheet, likewise
-  Eigen::Vector3d radiance_rgb = Eigen::Vector3d::Zero();
-  Eigen::Vector3d sd_rgb =
-      Eigen::Vector3d::Ones();  // standard deviation of that mean, up to a factor
-};
-
 struct LightFitOptions {
   double albedo = 0.99;  // of the paper, (0, 1]
   // Above which no rung is tried. kDistant is never: a sheet cannot tell it from a far near light.
-  LightModel highest_rung = LightModel::kLed;
+  LightModel highest_rung = LightModel::kLedField;
 
   // Names the first field out of range, with its value and its range.
   [[nodiscard]] Status Validate() const;
@@ -32,6 +24,7 @@ struct RungFit {
   double residual_rms = 0.0;  // of the samples that were used, in units of SheetSample::sd_rgb
   double held_out_rms = 0.0;  // of every fifth sample, after a fit without them, likewise
   int iterations = 0;
+  double roughness_weight = 0.0;  // of the field, as the held-out samples chose it (field_fit.h)
 };
 
 struct LightFit {
@@ -47,8 +40,8 @@ struct LightFit {
   Eigen::Vector3d flux_sd = Eigen::Vector3d::Zero();
 };
 
-/// One light from sheets of white paper in known poses: position and flux, and on the rung of an
-/// LED its axis and fall-off,
+/// One light from sheets of white paper in known poses: position and flux, on the rung of an LED its
+/// axis and fall-off, and above that a gain field (field_fit.h),
 ///
 ///     argmin sum_j sum_c ((i_jc - rho e_c(x_j) max(0, n_j . l(x_j))) / sd_jc)^2            (1)
 ///

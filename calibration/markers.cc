@@ -14,6 +14,8 @@ namespace {
 
 constexpr int kWidestForMarkersPx = 2500;  // wider pictures are shrunk to find markers in them
 
+constexpr double kSmoothingPx = 1.0;  // standard deviation
+
 // A view of our pixels; OpenCV has no constant one.
 cv::Mat MatOfGrey(const Image<uint8_t>& grey) {
   return {grey.height, grey.width, CV_8UC1, const_cast<uint8_t*>(grey.pixels.data())};
@@ -51,16 +53,23 @@ std::vector<MarkerView> FindMarkers(const Image<uint8_t>& grey, const std::strin
   return views;
 }
 
-Eigen::Vector2d RefineCorner(const Image<uint8_t>& grey, const Eigen::Vector2d& at_px,
+Image<uint8_t> SmoothedForCorners(const Image<uint8_t>& grey) {
+  Image<uint8_t> smooth(grey.Size());
+  cv::Mat result(grey.height, grey.width, CV_8UC1, smooth.pixels.data());
+  cv::GaussianBlur(MatOfGrey(grey), result, {}, kSmoothingPx);
+  return smooth;
+}
+
+Eigen::Vector2d RefineCorner(const Image<uint8_t>& smooth, const Eigen::Vector2d& at_px,
                              int half_window_px) {
   const double margin = half_window_px + 1.0;
-  if (!(at_px.x() >= margin && at_px.y() >= margin && at_px.x() < grey.width - 1 - margin &&
-        at_px.y() < grey.height - 1 - margin)) {
+  if (!(at_px.x() >= margin && at_px.y() >= margin && at_px.x() < smooth.width - 1 - margin &&
+        at_px.y() < smooth.height - 1 - margin)) {
     return at_px;
   }
   std::vector<cv::Point2f> corner = {
       {static_cast<float>(at_px.x()), static_cast<float>(at_px.y())}};
-  cv::cornerSubPix(MatOfGrey(grey), corner, {half_window_px, half_window_px}, {-1, -1},
+  cv::cornerSubPix(MatOfGrey(smooth), corner, {half_window_px, half_window_px}, {-1, -1},
                    {cv::TermCriteria::EPS + cv::TermCriteria::COUNT, 50, 1e-4});
   return {corner[0].x, corner[0].y};
 }

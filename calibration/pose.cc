@@ -1,5 +1,11 @@
 #include "calibration/pose.h"
 
+#include <algorithm>
+#include <map>
+#include <utility>
+
+#include "core/check.h"
+
 namespace sateen {
 namespace {
 
@@ -33,7 +39,56 @@ Matrix6d TableJacobian(const Eigen::Isometry3d& camera_from_board) {
   return jacobian / (2.0 * kPoseStep);
 }
 
+constexpr double kStillPx = 0.5;
+
 }  // namespace
+
+Result<BoardView> MeanView(const std::vector<BoardView>& views) {
+  SATEEN_CHECK(!views.empty());
+  std::map<int, std::pair<Eigen::Vector2d, int>> sums;
+  for (const BoardView& view : views) {
+    if (!(view.size_px == views[0].size_px)) {
+      return Fail(ErrorCode::kBadData, "{} is {} x {} px, {} is {} x {}; use pictures of one size",
+                  view.name, view.size_px.width, view.size_px.height, views[0].name,
+                  views[0].size_px.width, views[0].size_px.height);
+    }
+    std::vector<double> off_px;
+    for (size_t i = 0; i < view.ids.size(); ++i) {
+      auto [sum, is_new] = sums.try_emplace(view.ids[i], Eigen::Vector2d::Zero(), 0);
+      if (!is_new) {
+        const Eigen::Vector2d mean = sum->second.first / sum->second.second;
+        off_px.push_back((view.corners_px[i] - mean).norm());
+      }
+      sum->second.first += view.corners_px[i];
+      ++sum->second.second;
+    }
+    const auto middle = off_px.begin() + static_cast<std::ptrdiff_t>(off_px.size() / 2);
+    std::nth_element(off_px.begin(), middle, off_px.end());
+    if (!off_px.empty() && *middle > kStillPx) {
+      return Fail(
+          ErrorCode::kBadData,
+          "{}: its corners are {:.1f} px from those of the photographs before it; the board "
+          "or the camera moved: use photographs of one board lying still, or only one",
+          view.name, *middle);
+    }
+  }
+  BoardView mean = views[0];
+  mean.ids.clear();
+  mean.corners_px.clear();
+  mean.points_mm.clear();
+  for (const auto& [id, sum] : sums) {
+    mean.ids.push_back(id);
+    mean.corners_px.emplace_back(sum.first / sum.second);
+  }
+  for (const BoardView& view : views) {
+    for (size_t i = 0; i < view.ids.size(); ++i) {
+      const auto at = std::lower_bound(mean.ids.begin(), mean.ids.end(), view.ids[i]);
+      mean.points_mm.resize(mean.ids.size());
+      mean.points_mm[static_cast<size_t>(at - mean.ids.begin())] = view.points_mm[i];
+    }
+  }
+  return mean;
+}
 
 Result<PoseFit> FitPose(const Camera& lens, const BoardView& board) {
   if (!(board.size_px == lens.size_px)) {

@@ -32,4 +32,12 @@ struct PoseFit {
 /// Errors   as SolvePlanePose(); kInvalidArgument: another picture size than the lens's
 [[nodiscard]] Result<PoseFit> FitPose(const Camera& lens, const BoardView& board);
 
+/// The corners of several pictures of one board that nobody moved, each the mean of where it was
+/// seen, in the order of their ids.
+///
+/// views    at least 1
+/// Errors   kBadData: pictures of different sizes; a picture whose corners are, by the median, more
+///          than half a pixel from the others': board or camera moved
+[[nodiscard]] Result<BoardView> MeanView(const std::vector<BoardView>& views);
+
 }  // namespace sateen

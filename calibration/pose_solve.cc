@@ -1,9 +1,8 @@
 #include "calibration/pose_solve.h"
 
 #include <Eigen/Cholesky>
+#include <Eigen/SVD>
 #include <cmath>
-#include <opencv2/calib3d.hpp>
-#include <opencv2/core.hpp>
 #include <optional>
 
 #include "calibration/plane_map.h"
@@ -14,9 +13,9 @@ namespace {
 
 using Vector6d = Eigen::Matrix<double, 6, 1>;
 
-constexpr int kMostSteps = 100;
-constexpr double kStepTaken = 1e-12;  // relative fall of the cost that ends the steps
-constexpr double kRadStep = 1e-6;     // of numeric derivatives
+constexpr int kMostPoseSteps = 100;
+constexpr double kPoseStepTaken = 1e-12;  // relative fall of the cost that ends the steps
+constexpr double kRadStep = 1e-6;         // of numeric derivatives
 constexpr double kMmStep = 1e-4;
 constexpr double kSamePose = 0.1 * kRadPerDeg;
 constexpr double kClearlyWorse = 9.0;  // variances: 3 standard deviations
@@ -42,7 +41,7 @@ PlanePose RefinedPose(const Camera& camera, const Eigen::Isometry3d& start,
   Matrix6d normal = Matrix6d::Zero();
   double damping = 1e-6;
   bool settled = false;
-  for (int step = 0; step < kMostSteps && !settled; ++step) {
+  for (int step = 0; step < kMostPoseSteps && !settled; ++step) {
     for (Eigen::Index k = 0; k < 6; ++k) {
       const double h = k < 3 ? kRadStep : kMmStep;
       const Vector6d move = h * Vector6d::Unit(k);
@@ -54,14 +53,14 @@ PlanePose RefinedPose(const Camera& camera, const Eigen::Isometry3d& start,
     normal = jacobian.transpose() * jacobian;
     const Vector6d slope = jacobian.transpose() * residuals;
     settled = true;
-    for (int attempt = 0; attempt < kMostSteps; ++attempt) {
+    for (int attempt = 0; attempt < kMostPoseSteps; ++attempt) {
       Matrix6d damped = normal;
       damped.diagonal() *= 1.0 + damping;
       const Eigen::Isometry3d next = Moved(result.camera_from_plane, -damped.ldlt().solve(slope));
       const Eigen::VectorXd at_next = ResidualsPx(camera, next, points_mm, corners_px);
       if (at_next.squaredNorm() < residuals.squaredNorm()) {
-        settled =
-            residuals.squaredNorm() - at_next.squaredNorm() < kStepTaken * residuals.squaredNorm();
+        settled = residuals.squaredNorm() - at_next.squaredNorm() <
+                  kPoseStepTaken * residuals.squaredNorm();
         result.camera_from_plane = next;
         residuals = at_next;
         damping = std::max(damping / 10.0, 1e-12);
@@ -81,34 +80,39 @@ PlanePose RefinedPose(const Camera& camera, const Eigen::Isometry3d& start,
   return result;
 }
 
-// Both closed-form poses that put the plane before the camera, its front towards it.
+// The pose that the plane's map decomposes into, and the other one that looks much the same: with the
+// plane's normal mirrored in the line of sight. None where the plane shows its back.
 std::vector<Eigen::Isometry3d> RoughPoses(const std::vector<Eigen::Vector3d>& points_mm,
                                           const std::vector<Eigen::Vector2d>& directions) {
-  std::vector<cv::Point3d> points;
-  std::vector<cv::Point2d> seen;
-  points.reserve(points_mm.size());
-  seen.reserve(points_mm.size());
-  for (size_t i = 0; i < points_mm.size(); ++i) {
-    points.emplace_back(points_mm[i].x(), points_mm[i].y(), 0.0);
-    seen.emplace_back(directions[i].x(), directions[i].y());
+  const std::optional<PlaneMap> found = FitPlaneMap(points_mm, directions);
+  Eigen::Vector3d center_mm = Eigen::Vector3d::Zero();
+  for (const Eigen::Vector3d& point : points_mm) {
+    center_mm += point / static_cast<double>(points_mm.size());
   }
-  std::vector<cv::Vec3d> rotations;
-  std::vector<cv::Vec3d> translations;
-  cv::solvePnPGeneric(points, seen, cv::Mat::eye(3, 3, CV_64F), cv::noArray(), rotations,
-                      translations, false, cv::SOLVEPNP_IPPE);
-  std::vector<Eigen::Isometry3d> poses;
-  poses.reserve(rotations.size());
-  for (size_t i = 0; i < rotations.size(); ++i) {
-    const Eigen::Vector3d w(rotations[i][0], rotations[i][1], rotations[i][2]);
-    Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
-    pose.linear() = Eigen::AngleAxisd(w.norm(), w.stableNormalized()).toRotationMatrix();
-    pose.translation() =
-        Eigen::Vector3d(translations[i][0], translations[i][1], translations[i][2]);
-    if (pose.translation().z() > 0.0 && pose.linear().col(2).dot(pose.translation()) < 0.0) {
-      poses.push_back(pose);
-    }
+  if (!found) {
+    return {};
   }
-  return poses;
+  PlaneMap map = *found * (2.0 / (found->col(0).norm() + found->col(1).norm()));
+  if ((map * Eigen::Vector3d(center_mm.x(), center_mm.y(), 1.0)).z() < 0.0) {
+    map = -map;  // the plane lies before the camera
+  }
+  Eigen::Matrix3d axes;
+  axes << map.leftCols<2>(), map.col(0).cross(map.col(1));
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(axes, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+  pose.linear() = svd.matrixU() * svd.matrixV().transpose();
+  pose.translation() = map.col(2);
+  const Eigen::Vector3d seen_at = pose * center_mm;
+  const Eigen::Vector3d normal = pose.linear().col(2);
+  if (!(normal.dot(seen_at) < 0.0)) {
+    return {};
+  }
+  const Eigen::Vector3d sight = seen_at.normalized();
+  const Eigen::Vector3d mirrored = 2.0 * normal.dot(sight) * sight - normal;
+  Eigen::Isometry3d other = pose;
+  other.linear() = Eigen::Quaterniond::FromTwoVectors(normal, mirrored) * pose.linear();
+  other.translation() = seen_at - other.linear() * center_mm;
+  return {pose, other};
 }
 
 }  // namespace
@@ -151,9 +155,6 @@ Result<PlanePose> SolvePlanePose(const Camera& lens, const std::vector<Eigen::Ve
     return Fail(
         ErrorCode::kDegenerate,
         "no pose puts the board's printed side before the camera; is the picture mirrored?");
-  }
-  if (poses.size() == 1) {
-    return poses[0];
   }
   if (poses[1].rms_px < poses[0].rms_px) {
     std::swap(poses[0], poses[1]);

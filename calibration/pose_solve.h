@@ -22,9 +22,10 @@ struct PlanePose {
                                       const Eigen::Matrix<double, 6, 1>& step);
 
 /// The pose of points of the plane z = 0 that minimises the squared distances, in pixels, between
-/// where the lens shows them and where they were seen: from both solutions of the closed form
-/// (IPPE; Collins and Bartoli, "Infinitesimal plane-based pose estimation", IJCV 109, 2014) by
-/// Levenberg and Marquardt's method, and the better one.
+/// where the lens shows them and where they were seen, by Levenberg and Marquardt's method. There
+/// are two such poses, seldom far from each other's mirror image in the line of sight (Schweighofer
+/// and Pinz, "Robust pose estimation from a planar target", PAMI 28(12), 2006): it starts from both,
+/// and takes the better one.
 ///
 /// lens     its table_from_camera counts for nothing
 /// Errors   kDegenerate: fewer than 4 points or all in a line; a corner outside what the lens's

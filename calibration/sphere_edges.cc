@@ -15,11 +15,11 @@ namespace {
 
 constexpr int kTriples = 2000;
 constexpr double kFarthest = 0.16;  // a centre from the rough one, in radii
-constexpr int kFitRounds = 8;
-constexpr double kLeastEdge = 5e-4;      // of full scale, per pixel
-constexpr double kSecondaryEdge = 0.3;   // of the strongest edge along the same radius
-constexpr double kMadOfNormal = 1.4826;  // standard deviation over median deviation
-constexpr double kEdgeOutlier = 3.0;     // standard deviations
+constexpr int kCircleRounds = 8;
+constexpr double kLeastEdge = 5e-4;         // of full scale, per pixel
+constexpr double kSecondaryEdge = 0.3;      // of the strongest edge along the same radius
+constexpr double kRimMadOfNormal = 1.4826;  // standard deviation over median deviation
+constexpr double kEdgeOutlier = 3.0;        // standard deviations
 
 // Brightness, between pixels; at the border's value outside.
 double SampleAt(const Image<float>& gray, const Eigen::Vector2d& px) {
@@ -46,7 +46,8 @@ std::vector<double> SlopesOf(const std::vector<double>& profile, double sigma) {
     double sum = 0.0;
     for (int k = 1; k <= reach; ++k) {
       sum += k * std::exp(-0.5 * k * k / (sigma * sigma)) *
-             (profile[static_cast<size_t>(i + k)] - profile[static_cast<size_t>(i - k)]);
+             (profile[static_cast<size_t>(i) + static_cast<size_t>(k)] -
+              profile[static_cast<size_t>(i) - static_cast<size_t>(k)]);
     }
     slopes[static_cast<size_t>(i)] = sum / norm;
   }
@@ -97,7 +98,7 @@ std::vector<RimEdge> EdgesAround(const Image<float>& gray, const PixelOfPlane& p
   for (int rim = 0; rim < kRimPoints; ++rim) {
     for (int i = -half; i <= half; ++i) {
       const Eigen::Vector2d q = circle.At(rim, 1.0 + i * step);
-      profile[static_cast<size_t>(i + half)] = SampleAt(gray, pixel_of(q));
+      profile[static_cast<size_t>(i) + static_cast<size_t>(half)] = SampleAt(gray, pixel_of(q));
     }
     std::vector<double> slopes = SlopesOf(profile, sigma_px / step_px);
     for (double& slope : slopes) {
@@ -111,7 +112,7 @@ std::vector<RimEdge> EdgesAround(const Image<float>& gray, const PixelOfPlane& p
       const double bend = slopes[i - 1] - 2.0 * slopes[i] + slopes[i + 1];
       const double between = bend < 0.0 ? 0.5 * (slopes[i - 1] - slopes[i + 1]) / bend : 0.0;
       const double scale = 1.0 + (static_cast<double>(i) - half + between) * step;
-      edges.push_back({circle.At(rim, scale), rim});
+      edges.push_back({circle.At(rim, scale), rim, slopes[i]});
     }
   }
   return edges;
@@ -139,7 +140,7 @@ PlaneCircle BestOfTriples(const std::vector<RimEdge>& edges, const PlaneCircle& 
 
 PlaneCircle FitPlaneCircle(std::vector<RimEdge>& edges, PlaneCircle circle, double tolerance) {
   std::vector<RimEdge> used;
-  for (int round = 0; round < kFitRounds; ++round) {
+  for (int round = 0; round < kCircleRounds; ++round) {
     used.clear();
     Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
     Eigen::Vector3d right = Eigen::Vector3d::Zero();
@@ -153,8 +154,8 @@ PlaneCircle FitPlaneCircle(std::vector<RimEdge>& edges, PlaneCircle circle, doub
       }
       const Eigen::Vector2d out = (edge.at - circle.center).normalized();
       const Eigen::Vector3d row(out.x(), out.y(), 1.0);
-      normal += row * row.transpose();
-      right += off * row;
+      normal += edge.slope * row * row.transpose();
+      right += edge.slope * off * row;
       sizes.push_back(std::abs(off));
       used.push_back(edge);
     }
@@ -165,7 +166,7 @@ PlaneCircle FitPlaneCircle(std::vector<RimEdge>& edges, PlaneCircle circle, doub
     circle.center += change.head<2>();
     circle.radius += change[2];
     std::ranges::nth_element(sizes, sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2));
-    tolerance = std::clamp(kEdgeOutlier * kMadOfNormal * sizes[sizes.size() / 2],
+    tolerance = std::clamp(kEdgeOutlier * kRimMadOfNormal * sizes[sizes.size() / 2],
                            2e-4 * circle.radius, tolerance);
   }
   edges = std::move(used);

@@ -24,6 +24,7 @@ struct PlaneCircle {
 struct RimEdge {
   Eigen::Vector2d at;  // in the plane
   int rim;             // which of the kRimPoints radii
+  double slope = 1.0;  // of the brightness [1/px], its weight in the fit
 };
 
 using PixelOfPlane = std::function<Eigen::Vector2d(const Eigen::Vector2d&)>;

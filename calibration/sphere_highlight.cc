@@ -3,131 +3,149 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
+#include <opencv2/imgproc.hpp>
 #include <vector>
+
+#include "imaging/color.h"
 
 namespace sateen {
 namespace {
 
 constexpr double kSmoothShare = 200.0;  // of the radius: the box's half width
-constexpr float kFullScale = 0.99F;
+constexpr double kLeastWindowPx = 1.5;
+constexpr double kWindowShare = 0.5;  // of the blob's radius
+constexpr int kShiftRounds = 200;
+constexpr double kShiftDone = 1e-4;  // [px]
+constexpr std::array<double, 3> kLuma = {0.2989, 0.587, 0.114};
+constexpr double kLumaOfHighlight = 249.5 / 255.0;  // 250 of 255, rounded
 
-// The sphere's pixels and a margin, cut out; -1 where a pixel is not of its interior.
+// The sphere's interior, cut out of a photograph.
 struct SphereCrop {
-  int x0 = 0;
-  int y0 = 0;
-  Image<float> value;     // as photographed
-  Image<float> smoothed;  // over the interior alone
+  Eigen::Vector2d origin;     // pixel of the crop's (0, 0)
+  cv::Mat1f smoothed;         // over a two-hundredth of the radius
+  cv::Mat1b inside;           // 255 in the interior
+  std::vector<float> values;  // of the interior
 };
 
-// Sums of each run of 2 reach + 1 values, those below zero apart, over how many they are.
-void SmoothLines(Image<float>& image, int reach, bool columns) {
-  const int length = columns ? image.height : image.width;
-  const int lines = columns ? image.width : image.height;
-  std::vector<float> line(static_cast<size_t>(length));
-  for (int n = 0; n < lines; ++n) {
-    const auto at = [&](int i) -> float& { return columns ? image.At(n, i) : image.At(i, n); };
-    for (int i = 0; i < length; ++i) {
-      line[static_cast<size_t>(i)] = at(i);
-    }
-    for (int i = 0; i < length; ++i) {
-      float sum = 0.0F;
-      int count = 0;
-      for (int k = std::max(0, i - reach); k <= std::min(length - 1, i + reach); ++k) {
-        if (line[static_cast<size_t>(k)] >= 0.0F) {
-          sum += line[static_cast<size_t>(k)];
-          ++count;
-        }
-      }
-      if (at(i) >= 0.0F) {
-        at(i) = sum / static_cast<float>(count);
-      }
-    }
-  }
-}
-
 SphereCrop CropOf(const Image<float>& gray, const Sphere& sphere) {
-  SphereCrop crop;
+  int x0 = gray.width;
   int x1 = 0;
-  crop.x0 = gray.width;
-  crop.y0 = sphere.interior.front().y;
+  const int y0 = sphere.interior.front().y;
   for (const PixelSpan& span : sphere.interior) {
-    crop.x0 = std::min(crop.x0, span.x_begin);
+    x0 = std::min(x0, span.x_begin);
     x1 = std::max(x1, span.x_end);
   }
-  crop.value = Image<float>(x1 - crop.x0, static_cast<int>(sphere.interior.size()), -1.0F);
-  for (const PixelSpan& span : sphere.interior) {
-    for (int x = span.x_begin; x < span.x_end; ++x) {
-      crop.value.At(x - crop.x0, span.y - crop.y0) = std::max(0.0F, gray.At(x, span.y));
-    }
-  }
-  crop.smoothed = crop.value;
+  const cv::Mat1f all(gray.height, gray.width, const_cast<float*>(gray.pixels.data()));
+  const cv::Rect box(x0, y0, x1 - x0, static_cast<int>(sphere.interior.size()));
+  SphereCrop crop{Eigen::Vector2d(x0, y0), {}, cv::Mat1b(box.size(), uint8_t{0}), {}};
   const int reach = std::max(1, static_cast<int>(sphere.outline.radius_px / kSmoothShare));
-  SmoothLines(crop.smoothed, reach, false);
-  SmoothLines(crop.smoothed, reach, true);
+  cv::blur(all(box), crop.smoothed, cv::Size(2 * reach + 1, 2 * reach + 1), cv::Point(-1, -1),
+           cv::BORDER_REPLICATE);
+  for (const PixelSpan& span : sphere.interior) {
+    crop.inside.row(span.y - y0).colRange(span.x_begin - x0, span.x_end - x0) = 255;
+    const float* row = crop.smoothed[span.y - y0];
+    crop.values.insert(crop.values.end(), row + span.x_begin - x0, row + span.x_end - x0);
+  }
   return crop;
 }
 
 struct LampBlob {
   double light = 0.0;
-  Eigen::Vector2d weighted = Eigen::Vector2d::Zero();
   double pixels = 0.0;
-  double saturated = 0.0;
+  Eigen::Vector2d weighted = Eigen::Vector2d::Zero();
 
   [[nodiscard]] Eigen::Vector2d Center() const { return weighted / light; }
 };
 
-// Takes the 8-connected blob of pixels above `level` at (x, y) out of `open`.
-LampBlob TakeBlob(const SphereCrop& crop, Image<float>& open, int x, int y, float level) {
-  LampBlob blob;
-  std::vector<std::array<int, 2>> queue = {{x, y}};
-  open.At(x, y) = -1.0F;
-  for (size_t next = 0; next < queue.size(); ++next) {
-    const auto [px, py] = queue[next];
-    const double light = crop.smoothed.At(px, py) - level;
-    blob.light += light;
-    blob.weighted += light * Eigen::Vector2d(px + crop.x0, py + crop.y0);
-    blob.pixels += 1.0;
-    blob.saturated += crop.value.At(px, py) >= kFullScale ? 1.0 : 0.0;
-    for (int j = std::max(0, py - 1); j <= std::min(open.height - 1, py + 1); ++j) {
-      for (int i = std::max(0, px - 1); i <= std::min(open.width - 1, px + 1); ++i) {
-        if (open.At(i, j) > level) {
-          open.At(i, j) = -1.0F;
-          queue.push_back({i, j});
-        }
-      }
-    }
-  }
-  return blob;
-}
-
-// Brightest first.
+// The 8-connected blobs above `level`, brightest first.
 std::vector<LampBlob> BlobsOf(const SphereCrop& crop, float level) {
-  Image<float> open = crop.smoothed;
-  std::vector<LampBlob> blobs;
-  blobs.reserve(64);
-  for (int y = 0; y < open.height; ++y) {
-    for (int x = 0; x < open.width; ++x) {
-      if (open.At(x, y) > level) {
-        blobs.push_back(TakeBlob(crop, open, x, y, level));
+  cv::Mat1b bright = crop.inside.clone();
+  std::transform(crop.smoothed.begin(), crop.smoothed.end(), bright.begin(), bright.begin(),
+                 [&](float i, uint8_t inside) { return i > level ? inside : uint8_t{0}; });
+  cv::Mat1i labels;
+  std::vector<LampBlob> blobs(static_cast<size_t>(cv::connectedComponents(bright, labels)));
+  for (int y = 0; y < labels.rows; ++y) {
+    for (int x = 0; x < labels.cols; ++x) {
+      if (bright(y, x) != 0) {
+        LampBlob& blob = blobs[static_cast<size_t>(labels(y, x))];
+        const auto light = static_cast<double>(crop.smoothed(y, x) - level);
+        blob.light += light;
+        blob.pixels += 1.0;
+        blob.weighted += light * Eigen::Vector2d(x, y);
       }
     }
   }
+  blobs.erase(blobs.begin());  // what is not bright
   std::ranges::stable_sort(blobs, std::greater<>(), &LampBlob::light);
   return blobs;
 }
 
-Status CheckInside(const Image<float>& gray, const Sphere& sphere, std::string_view frame) {
+// Equation (2), from `c` on.
+Eigen::Vector2d CenterByMeanShift(const SphereCrop& crop, Eigen::Vector2d c, double s,
+                                  double level) {
+  const double reach = 4.0 * s;
+  for (int round = 0; round < kShiftRounds; ++round) {
+    Eigen::Vector2d sum = Eigen::Vector2d::Zero();
+    double weights = 0.0;
+    const auto first = [&](double at) { return std::max(0, static_cast<int>(at - reach)); };
+    const int y_end = std::min(crop.smoothed.rows, static_cast<int>(c.y() + reach) + 2);
+    const int x_end = std::min(crop.smoothed.cols, static_cast<int>(c.x() + reach) + 2);
+    for (int y = first(c.y()); y < y_end; ++y) {
+      for (int x = first(c.x()); x < x_end; ++x) {
+        const auto i = static_cast<double>(crop.smoothed(y, x));
+        if (crop.inside(y, x) != 0 && i > level) {
+          const Eigen::Vector2d at(x, y);
+          const double w = (i - level) * std::exp(-(at - c).squaredNorm() / (2.0 * s * s));
+          sum += w * at;
+          weights += w;
+        }
+      }
+    }
+    const Eigen::Vector2d next = sum / weights;
+    const double moved = (next - c).norm();
+    c = next;
+    if (moved < kShiftDone) {
+      break;
+    }
+  }
+  return c;
+}
+
+Status CheckInside(ImageSize size, const Sphere& sphere, std::string_view frame) {
   const bool inside =
       !sphere.interior.empty() && std::ranges::all_of(sphere.interior, [&](const PixelSpan& span) {
-        return span.y >= 0 && span.y < gray.height && span.x_begin >= 0 &&
-               span.x_end <= gray.width && span.x_begin < span.x_end;
+        return span.y >= 0 && span.y < size.height && span.x_begin >= 0 &&
+               span.x_end <= size.width && span.x_begin < span.x_end;
       });
   return inside ? Status()
                 : Fail(ErrorCode::kBadData,
                        "{}: {} x {} px do not hold the sphere at ({:.0f}, {:.0f}) px; need a "
                        "photograph like the one it was found in",
-                       frame, gray.width, gray.height, sphere.outline.center_px.x(),
+                       frame, size.width, size.height, sphere.outline.center_px.x(),
                        sphere.outline.center_px.y());
+}
+
+// Why these blobs are no lamp's, if they are not.
+Status CheckBlobs(const std::vector<LampBlob>& blobs, const SphereCrop& crop,
+                  std::string_view frame, const HighlightOptions& options) {
+  const double share = blobs[0].pixels / static_cast<double>(crop.values.size());
+  const Eigen::Vector2d at = crop.origin + blobs[0].Center();
+  if (share > options.most_area) {
+    return Fail(ErrorCode::kDegenerate,
+                "{}: the highlight at ({:.0f}, {:.0f}) px covers {:.1f} % of the sphere; a lamp "
+                "covers at most {:.1f} %: darken the room, expose less",
+                frame, at.x(), at.y(), 100.0 * share, 100.0 * options.most_area);
+  }
+  if (blobs.size() > 1 && blobs[1].light > options.most_runner_up * blobs[0].light) {
+    const Eigen::Vector2d other = crop.origin + blobs[1].Center();
+    return Fail(ErrorCode::kDegenerate,
+                "{}: two highlights alike in one sphere, at ({:.0f}, {:.0f}) and ({:.0f}, {:.0f}) "
+                "px, the second with {:.0f} % of the first one's light; need one lamp a frame",
+                frame, at.x(), at.y(), other.x(), other.y(),
+                100.0 * blobs[1].light / blobs[0].light);
+  }
+  return {};
 }
 
 }  // namespace
@@ -153,20 +171,16 @@ Status HighlightOptions::Validate() const {
 
 Result<Highlight> FindHighlight(const Image<float>& gray, const Sphere& sphere,
                                 std::string_view frame, const HighlightOptions& options) {
-  if (Status status = options.Validate().and_then([&] { return CheckInside(gray, sphere, frame); });
+  if (Status status =
+          options.Validate().and_then([&] { return CheckInside(gray.Size(), sphere, frame); });
       !status) {
     return tl::unexpected(status.error());
   }
-  const SphereCrop crop = CropOf(gray, sphere);
-  std::vector<float> values;
-  values.reserve(crop.smoothed.pixels.size());
-  std::ranges::copy_if(crop.smoothed.pixels, std::back_inserter(values),
-                       [](float value) { return value >= 0.0F; });
-  const auto area = static_cast<double>(values.size());
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::ranges::nth_element(values, middle);
-  const double median = *middle;
-  const double peak = *std::ranges::max_element(values);
+  SphereCrop crop = CropOf(gray, sphere);
+  const auto middle = crop.values.begin() + static_cast<std::ptrdiff_t>(crop.values.size() / 2);
+  std::ranges::nth_element(crop.values, middle);
+  const auto median = static_cast<double>(*middle);
+  const auto peak = static_cast<double>(*std::max_element(middle, crop.values.end()));
   if (!(peak - median >= options.least_rise)) {
     return Fail(ErrorCode::kDegenerate,
                 "{}: no highlight in the sphere at ({:.0f}, {:.0f}) px: its brightest place has "
@@ -174,29 +188,59 @@ Result<Highlight> FindHighlight(const Image<float>& gray, const Sphere& sphere,
                 frame, sphere.outline.center_px.x(), sphere.outline.center_px.y(), peak, median,
                 options.least_rise);
   }
-  const auto level = static_cast<float>(median + options.level * (peak - median));
+  const auto level = static_cast<float>(median + options.level * (peak - median));  // (1)
   const std::vector<LampBlob> blobs = BlobsOf(crop, level);
-  const LampBlob& lamp = blobs.front();
-  const Eigen::Vector2d at = lamp.Center();
-  if (lamp.pixels > options.most_area * area) {
-    return Fail(ErrorCode::kDegenerate,
-                "{}: the highlight at ({:.0f}, {:.0f}) px covers {:.1f} % of the sphere; a lamp "
-                "covers at most {:.1f} %: darken the room, expose less",
-                frame, at.x(), at.y(), 100.0 * lamp.pixels / area, 100.0 * options.most_area);
+  if (Status status = CheckBlobs(blobs, crop, frame, options); !status) {
+    return tl::unexpected(status.error());
   }
-  const double runner_up = blobs.size() > 1 ? blobs[1].light / lamp.light : 0.0;
-  if (runner_up > options.most_runner_up) {
-    const Eigen::Vector2d other = blobs[1].Center();
-    return Fail(ErrorCode::kDegenerate,
-                "{}: two highlights alike in one sphere, at ({:.0f}, {:.0f}) and ({:.0f}, {:.0f}) "
-                "px, the second with {:.0f} % of the first one's light; need one lamp a frame",
-                frame, at.x(), at.y(), other.x(), other.y(), 100.0 * runner_up);
-  }
-  return Highlight{.at_px = at,
+  const double radius_px = std::sqrt(blobs[0].pixels / std::numbers::pi);
+  const double s = std::max(kLeastWindowPx, kWindowShare * radius_px);
+  const Eigen::Vector2d c =
+      CenterByMeanShift(crop, blobs[0].Center(), s, (median + peak) / 2.0);  // (2)
+  return Highlight{.at_px = crop.origin + c,
                    .peak = peak,
-                   .area_share = lamp.pixels / area,
-                   .runner_up = runner_up,
-                   .saturated = lamp.saturated / lamp.pixels};
+                   .radius_px = radius_px,
+                   .area_share = blobs[0].pixels / static_cast<double>(crop.values.size()),
+                   .runner_up = blobs.size() > 1 ? blobs[1].light / blobs[0].light : 0.0};
+}
+
+Result<Highlight> MedianHighlight(const Image3& photo, const Sphere& sphere,
+                                  std::string_view frame) {
+  if (Status status = CheckInside(photo.Size(), sphere, frame); !status) {
+    return tl::unexpected(status.error());
+  }
+  std::vector<double> xs;
+  std::vector<double> ys;
+  double pixels = 0.0;
+  for (const PixelSpan& span : sphere.interior) {
+    for (int x = span.x_begin; x < span.x_end; ++x) {
+      double luma = 0.0;
+      for (size_t c = 0; c < 3; ++c) {
+        luma += kLuma[c] * static_cast<double>(SrgbFromLinear(photo[c].At(x, span.y)));
+      }
+      pixels += 1.0;
+      if (luma >= kLumaOfHighlight) {
+        xs.push_back(x);
+        ys.push_back(span.y);
+      }
+    }
+  }
+  if (xs.empty()) {
+    return Fail(ErrorCode::kDegenerate,
+                "{}: no pixel of the sphere at ({:.0f}, {:.0f}) px has a luma of 250 of 255; use "
+                "the lamp's own highlight",
+                frame, sphere.outline.center_px.x(), sphere.outline.center_px.y());
+  }
+  const auto count = static_cast<double>(xs.size());
+  const auto middle = [](std::vector<double>& values) {  // of two, where there are two
+    std::ranges::sort(values);
+    return (values[(values.size() - 1) / 2] + values[values.size() / 2]) / 2.0;
+  };
+  return Highlight{.at_px = {middle(xs), middle(ys)},
+                   .peak = kLumaOfHighlight,
+                   .radius_px = std::sqrt(count / std::numbers::pi),
+                   .area_share = count / pixels,
+                   .runner_up = 0.0};
 }
 
 }  // namespace sateen

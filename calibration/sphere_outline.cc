@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 #include "calibration/sphere_edges.h"
 
@@ -80,26 +81,22 @@ std::vector<PixelSpan> InteriorOf(const std::vector<Eigen::Vector2d>& rim,
   return spans;
 }
 
-// The rough circle of the image as one of the plane.
-std::optional<PlaneCircle> RoughInPlane(const OutlinePlane& plane, const Circle& rough) {
-  PlaneCircle circle;
-  const std::optional<Eigen::Vector2d> center = plane.FromPixel(rough.center_px);
-  if (!center) {
-    return std::nullopt;
-  }
-  circle.center = *center;
-  constexpr int kSides = 16;
-  for (int side = 0; side < kSides; ++side) {
-    const double angle = 2.0 * std::numbers::pi * side / kSides;
-    const Eigen::Vector2d out(std::cos(angle), std::sin(angle));
-    const std::optional<Eigen::Vector2d> q =
-        plane.FromPixel(rough.center_px + rough.radius_px * out);
-    if (!q) {
+// A circle of the image as one of the plane, as well as it is one there.
+std::optional<PlaneCircle> InPlane(const OutlinePlane& plane, const Circle& circle) {
+  const std::optional<Eigen::Vector2d> center = plane.FromPixel(circle.center_px);
+  const PlaneCircle in_image{circle.center_px, circle.radius_px};
+  std::vector<RimEdge> rim;
+  rim.reserve(kRimPoints);
+  double radius = 0.0;
+  for (int i = 0; i < kRimPoints; ++i) {
+    const std::optional<Eigen::Vector2d> q = plane.FromPixel(in_image.At(i));
+    if (!center || !q) {
       return std::nullopt;
     }
-    circle.radius += (*q - circle.center).norm() / kSides;
+    rim.push_back({*q, i});
+    radius += (*q - *center).norm() / kRimPoints;
   }
-  return circle;
+  return FitPlaneCircle(rim, {*center, radius}, radius);
 }
 
 // Fills in where the sphere stands, from the circle in the plane.
@@ -120,6 +117,84 @@ void Place(const OutlinePlane& plane, const PlaneCircle& circle, const SphereOpt
                   options.radius_mm / std::sin(w) * axis;  // (4)
 }
 
+bool IsCut(ImageSize size, const Eigen::Vector2d& px) {
+  return !(px.x() >= 0.0 && px.y() >= 0.0 && px.x() <= size.width - 1.0 &&
+           px.y() <= size.height - 1.0);
+}
+
+auto CutError(ImageSize size, const Circle& circle, std::string_view name) {
+  return Fail(ErrorCode::kBadData,
+              "{}: the sphere at ({:.0f}, {:.0f}) px of radius {:.0f} px is cut by the frame of "
+              "{} x {} px; need all of it",
+              name, circle.center_px.x(), circle.center_px.y(), circle.radius_px, size.width,
+              size.height);
+}
+
+Status CheckCircle(ImageSize size, const Circle& circle, std::string_view name,
+                   const SphereOptions& options) {
+  if (Status status = options.Validate(); !status) {
+    return status;
+  }
+  if (options.camera && options.camera->size_px != size) {
+    return Fail(ErrorCode::kBadData, "{}: {} x {} px; the camera has {} x {}", name, size.width,
+                size.height, options.camera->size_px.width, options.camera->size_px.height);
+  }
+  if (IsCut(size, circle.center_px)) {
+    return CutError(size, circle, name);
+  }
+  if (!(circle.radius_px >= kLeastRadiusPx)) {
+    return Fail(ErrorCode::kDegenerate,
+                "{}: the sphere at ({:.0f}, {:.0f}) px has a radius of {:.1f} px; need {}", name,
+                circle.center_px.x(), circle.center_px.y(), circle.radius_px, kLeastRadiusPx);
+  }
+  return {};
+}
+
+// A circle of the plane round the rough one of the image.
+struct OutlineStart {
+  OutlinePlane plane;
+  PlaneCircle circle;
+};
+
+Result<OutlineStart> StartAt(ImageSize size, const Circle& rough, std::string_view name,
+                             const SphereOptions& options) {
+  if (Status status = CheckCircle(size, rough, name, options); !status) {
+    return tl::unexpected(status.error());
+  }
+  const std::optional<Eigen::Vector3d> axis =
+      options.camera ? RayOfPixel(*options.camera, rough.center_px.x(), rough.center_px.y())
+                     : Eigen::Vector3d(Eigen::Vector3d::UnitZ());
+  const OutlinePlane plane(options.camera, axis.value_or(Eigen::Vector3d::UnitZ()));
+  const std::optional<PlaneCircle> circle = axis ? InPlane(plane, rough) : std::nullopt;
+  if (!circle) {
+    return Fail(ErrorCode::kDegenerate,
+                "{}: the camera's distortion cannot be undone round the sphere at ({:.0f}, {:.0f})",
+                name, rough.center_px.x(), rough.center_px.y());
+  }
+  return OutlineStart{plane, *circle};
+}
+
+// The sphere whose outline this circle of the plane is.
+Result<Sphere> SphereOf(const OutlinePlane& plane, const PlaneCircle& circle, ImageSize size,
+                        std::string_view name, const SphereOptions& options) {
+  Sphere sphere;
+  std::vector<Eigen::Vector2d> rim(kRimPoints);
+  for (int i = 0; i < kRimPoints; ++i) {
+    rim[static_cast<size_t>(i)] = plane.ToPixel(circle.At(i));
+    sphere.outline.center_px += rim[static_cast<size_t>(i)] / kRimPoints;
+  }
+  for (const Eigen::Vector2d& px : rim) {
+    sphere.outline.radius_px += (px - sphere.outline.center_px).norm() / kRimPoints;
+  }
+  if (std::ranges::any_of(rim, [&](const Eigen::Vector2d& px) { return IsCut(size, px); })) {
+    return CutError(size, sphere.outline, name);
+  }
+  sphere.interior = InteriorOf(rim, sphere.outline.center_px);
+  sphere.rim = std::move(rim);
+  Place(plane, circle, options, sphere);
+  return sphere;
+}
+
 }  // namespace
 
 Status SphereOptions::Validate() const {
@@ -135,44 +210,21 @@ Status SphereOptions::Validate() const {
   return camera ? camera->Validate("camera") : Status();
 }
 
+Result<Sphere> SphereFromCircle(const Circle& circle, ImageSize size, std::string_view name,
+                                const SphereOptions& options) {
+  return StartAt(size, circle, name, options).and_then([&](const OutlineStart& start) {
+    return SphereOf(start.plane, start.circle, size, name, options);
+  });
+}
+
 Result<Sphere> FindSphere(const Image<float>& gray, const Circle& rough, std::string_view name,
                           const SphereOptions& options) {
-  if (Status status = options.Validate(); !status) {
-    return tl::unexpected(status.error());
-  }
-  if (options.camera && options.camera->size_px != gray.Size()) {
-    return Fail(ErrorCode::kBadData, "{}: {} x {} px; the camera has {} x {}", name, gray.width,
-                gray.height, options.camera->size_px.width, options.camera->size_px.height);
-  }
-  const auto cut = [&](const Eigen::Vector2d& px) {
-    return !(px.x() >= 0.0 && px.y() >= 0.0 && px.x() <= gray.width - 1.0 &&
-             px.y() <= gray.height - 1.0);
-  };
-  const auto cut_error = [&] {
-    return Fail(ErrorCode::kBadData,
-                "{}: the sphere at ({:.0f}, {:.0f}) px of radius {:.0f} px is cut by the frame of "
-                "{} x {} px; need all of it",
-                name, rough.center_px.x(), rough.center_px.y(), rough.radius_px, gray.width,
-                gray.height);
-  };
-  if (!(rough.radius_px >= kLeastRadiusPx) || cut(rough.center_px)) {
-    return cut(rough.center_px)
-               ? cut_error()
-               : Fail(ErrorCode::kDegenerate, "{}: a sphere of radius {:.1f} px; need {}", name,
-                      rough.radius_px, kLeastRadiusPx);
-  }
-  const Eigen::Vector3d axis =
-      options.camera ? RayOfPixel(*options.camera, rough.center_px.x(), rough.center_px.y())
-                           .value_or(Eigen::Vector3d::UnitZ())
-                     : Eigen::Vector3d(Eigen::Vector3d::UnitZ());
-  const OutlinePlane plane(options.camera, axis);
-  const std::optional<PlaneCircle> start = RoughInPlane(plane, rough);
+  const Result<OutlineStart> start = StartAt(gray.Size(), rough, name, options);
   if (!start) {
-    return Fail(ErrorCode::kDegenerate,
-                "{}: the camera's distortion cannot be undone round the sphere at ({:.0f}, {:.0f})",
-                name, rough.center_px.x(), rough.center_px.y());
+    return tl::unexpected(start.error());
   }
-  PlaneCircle circle = *start;
+  const OutlinePlane& plane = start->plane;
+  PlaneCircle circle = start->circle;
   std::vector<RimEdge> edges;
   for (const double band : kBands) {
     edges = EdgesAround(
@@ -184,34 +236,24 @@ Result<Sphere> FindSphere(const Image<float>& gray, const Circle& rough, std::st
     }
     circle = FitPlaneCircle(edges, circle, tolerance);
   }
-  Sphere sphere;
-  sphere.seen = ShareSeen(edges);
-  if (!(sphere.seen >= options.least_seen)) {
+  const double seen = ShareSeen(edges);
+  if (!(seen >= options.least_seen)) {
     return Fail(ErrorCode::kDegenerate,
                 "{}: {:.0f} % of the outline of the sphere at ({:.0f}, {:.0f}) px is seen; need "
-                "{:.0f} %: light it from behind or give a mask",
-                name, 100.0 * sphere.seen, rough.center_px.x(), rough.center_px.y(),
+                "{:.0f} %: light it from behind, or give a mask or its circle",
+                name, 100.0 * seen, rough.center_px.x(), rough.center_px.y(),
                 100.0 * options.least_seen);
   }
-  std::vector<Eigen::Vector2d> rim(kRimPoints);
-  for (int i = 0; i < kRimPoints; ++i) {
-    rim[static_cast<size_t>(i)] = plane.ToPixel(circle.At(i));
-    sphere.outline.center_px += rim[static_cast<size_t>(i)] / kRimPoints;
+  Result<Sphere> sphere = SphereOf(plane, circle, gray.Size(), name, options);
+  if (sphere) {
+    double squares = 0.0;
+    for (const RimEdge& edge : edges) {
+      squares += circle.Off(edge.at) * circle.Off(edge.at);
+    }
+    sphere->seen = seen;
+    sphere->residual_px = std::sqrt(squares / static_cast<double>(edges.size())) *
+                          sphere->outline.radius_px / circle.radius;
   }
-  if (std::ranges::any_of(rim, cut)) {
-    return cut_error();
-  }
-  for (const Eigen::Vector2d& px : rim) {
-    sphere.outline.radius_px += (px - sphere.outline.center_px).norm() / kRimPoints;
-  }
-  double squares = 0.0;
-  for (const RimEdge& edge : edges) {
-    squares += circle.Off(edge.at) * circle.Off(edge.at);
-  }
-  sphere.residual_px = std::sqrt(squares / static_cast<double>(edges.size())) *
-                       sphere.outline.radius_px / circle.radius;
-  sphere.interior = InteriorOf(rim, sphere.outline.center_px);
-  Place(plane, circle, options, sphere);
   return sphere;
 }
 

@@ -22,10 +22,13 @@ struct PixelSpan {
 struct Sphere {
   Eigen::Vector3d center = Eigen::Vector3d::Zero();
   double radius = 0.0;
-  Circle outline;                   // as it is seen: the mean circle about the outline's centroid
-  std::vector<PixelSpan> interior;  // the pixels within 97 % of the outline
-  double residual_px = 0.0;         // root mean square of edges from the outline
-  double seen = 0.0;                // share of the outline on which an edge was found
+  Circle outline;                    // as it is seen: the mean circle about the outline's centroid
+  std::vector<Eigen::Vector2d> rim;  // points of the outline [px]
+  std::vector<PixelSpan> interior;   // the pixels within 97 % of the outline
+  // Of an outline that was found: root mean square of edges from it, and the share of it on which an
+  // edge was seen. 0 for a circle that was given.
+  double residual_px = 0.0;
+  double seen = 0.0;
 };
 
 struct SphereOptions {
@@ -67,5 +70,13 @@ struct SphereOptions {
 /// Cost     O(radius), some 50 ms at 500 px; deterministic
 [[nodiscard]] Result<Sphere> FindSphere(const Image<float>& gray, const Circle& rough,
                                         std::string_view name, const SphereOptions& options = {});
+
+/// A sphere whose outline a person marked: `circle` counts as it is, by (1) to (4).
+///
+/// size     of the photographs
+/// Errors   as FindSphere, but for what is seen
+[[nodiscard]] Result<Sphere> SphereFromCircle(const Circle& circle, ImageSize size,
+                                              std::string_view name,
+                                              const SphereOptions& options = {});
 
 }  // namespace sateen

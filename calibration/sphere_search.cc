@@ -10,8 +10,10 @@ namespace {
 
 constexpr int kSearchSizePx = 256;
 constexpr int kLeastSidePx = 16;
-constexpr int kBins = 72;              // directions round a centre
-constexpr double kLeastSeen = 0.4;     // of them
+constexpr int kBins = 72;           // directions round a centre
+constexpr double kLeastSeen = 0.4;  // of them
+constexpr double kAlikeSeen = 0.8;  // of the best, where their number is not known
+constexpr double kAlikeRadius = 0.5;
 constexpr double kLeastRadius = 0.05;  // of the shorter side
 constexpr double kMostRadius = 0.6;
 constexpr int kCandidates = 40;        // centres that are looked at
@@ -75,7 +77,7 @@ std::vector<GradientEdge> GradientEdges(const Image<float>& small) {
       const float here = strength.At(x, y);
       if (here >= least && here >= strength.At(x + dx, y + dy) &&
           here >= strength.At(x - dx, y - dy)) {
-        edges.push_back({{x, y}, g, here});
+        edges.push_back({{x, y}, g, static_cast<double>(here)});
       }
     }
   }
@@ -206,17 +208,18 @@ Result<std::vector<Circle>> CirclesInMask(const Mask& mask, int count, std::stri
            circles.front().radius_px * circles.front().radius_px;
   };
   const auto spheres = std::ranges::find_if(circles, is_dust) - circles.begin();
-  if (spheres != count) {
-    return Fail(ErrorCode::kBadData, "{}: {} regions; need {}, one a sphere", name, spheres, count);
+  if (spheres == 0 || (count != 0 && spheres != count)) {
+    return Fail(ErrorCode::kBadData, "{}: {} regions; need {}, one a sphere", name, spheres,
+                std::max(count, 1));
   }
-  circles.resize(static_cast<size_t>(count));
+  circles.resize(static_cast<size_t>(spheres));
   return circles;
 }
 
 Result<std::vector<Circle>> FindCircles(const Image<float>& gray, int count,
                                         std::string_view name) {
-  if (count < 1) {
-    return Fail(ErrorCode::kInvalidArgument, "count = {}; need at least one sphere", count);
+  if (count < 0) {
+    return Fail(ErrorCode::kInvalidArgument, "count = {}; need 0 or more spheres", count);
   }
   const int step = std::max(1, std::max(gray.width, gray.height) / kSearchSizePx);
   const Image<float> small = Reduced(gray, step);
@@ -245,18 +248,23 @@ Result<std::vector<Circle>> FindCircles(const Image<float>& gray, int count,
   std::ranges::stable_sort(seen, std::greater<>(), &SeenCircle::seen);
   std::vector<Circle> circles;
   circles.reserve(static_cast<size_t>(count));
+  const auto wanted = static_cast<size_t>(count);
+  const double least_seen =
+      count == 0 ? std::max(kLeastSeen, kAlikeSeen * seen.front().seen) : kLeastSeen;
+  const double least_radius = count == 0 ? kAlikeRadius * seen.front().circle.radius_px : 0.0;
   for (const SeenCircle& found : seen) {
     const bool taken = std::ranges::any_of(
         circles, [&](const Circle& circle) { return Overlap(circle, found.circle); });
-    if (!taken && found.seen >= kLeastSeen && circles.size() < static_cast<size_t>(count)) {
+    if (!taken && found.seen >= least_seen && found.circle.radius_px >= least_radius &&
+        (count == 0 || circles.size() < wanted)) {
       circles.push_back(found.circle);
     }
   }
-  if (circles.size() < static_cast<size_t>(count)) {
+  if (circles.size() < std::max<size_t>(wanted, 1)) {
     return Fail(ErrorCode::kDegenerate,
                 "{}: {} of {} spheres stand out (the best circle is seen to {:.0f} %); give a mask "
-                "or rough circles, or a photograph by room light",
-                name, circles.size(), count, 100.0 * seen.front().seen);
+                "or their circles, or a photograph by room light",
+                name, circles.size(), std::max(count, 1), 100.0 * seen.front().seen);
   }
   for (Circle& circle : circles) {
     circle.center_px = (circle.center_px.array() + 0.5) * step - 0.5;

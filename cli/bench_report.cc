@@ -5,29 +5,22 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "cli/svg_plot.h"
+
 namespace sateen::cli {
 namespace {
-
-// A logarithmic axis of the plot, from one power of ten to another.
-struct LogAxis {
-  int first;     // exponent at `begin`
-  int last;      // exponent at `end`
-  double begin;  // [px]
-  double end;    // [px]
-
-  [[nodiscard]] double At(double value) const {
-    const double exponent = std::clamp<double>(std::log10(value), first, last);
-    return begin + (exponent - first) / (last - first) * (end - begin);
-  }
-};
 
 struct Style {
   std::string_view name;
   std::string_view color;
 };
 
-constexpr std::array<Style, 4> kCases = {
-    {{"clean", "#1b7837"}, {"noisy", "#2166ac"}, {"hard", "#b2182b"}, {"subnormal", "#762a83"}}};
+constexpr std::array<Style, 6> kCases = {{{"clean", "#1b7837"},
+                                          {"noisy", "#2166ac"},
+                                          {"hard", "#b2182b"},
+                                          {"led", "#bf812d"},
+                                          {"led+field", "#01665e"},
+                                          {"subnormal", "#762a83"}}};
 
 std::string ColorOf(std::string_view case_name) {
   const auto* found = std::find_if(kCases.begin(), kCases.end(),
@@ -35,35 +28,7 @@ std::string ColorOf(std::string_view case_name) {
   return std::string(found == kCases.end() ? "#000000" : found->color);
 }
 
-std::string Text(double x, double y, std::string_view anchor, std::string_view text,
-                 std::string_view color = "#333333") {
-  return fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"{}\" fill=\"{}\">{}</text>\n",
-                     x, y, anchor, color, text);
-}
-
-std::string Line(double x1, double y1, double x2, double y2, std::string_view style) {
-  return fmt::format("<line x1=\"{:.1f}\" y1=\"{:.1f}\" x2=\"{:.1f}\" y2=\"{:.1f}\" {}/>\n", x1, y1,
-                     x2, y2, style);
-}
-
-// A grid line and a label at each power of ten.
-std::string Grid(const LogAxis& x, const LogAxis& y) {
-  constexpr std::string_view kGridStyle = "stroke=\"#dddddd\"";
-  std::string svg;
-  for (int exponent = x.first; exponent <= x.last; ++exponent) {
-    const double value = std::pow(10.0, exponent);
-    svg += Line(x.At(value), y.begin, x.At(value), y.end, kGridStyle);
-    svg += Text(x.At(value), y.begin + 18.0, "middle", fmt::format("{:g}", value));
-  }
-  for (int exponent = y.first; exponent <= y.last; ++exponent) {
-    const double value = std::pow(10.0, exponent);
-    svg += Line(x.begin, y.At(value), x.end, y.At(value), kGridStyle);
-    svg += Text(x.begin - 8.0, y.At(value) + 4.0, "end", fmt::format("{:g}", value));
-  }
-  return svg;
-}
-
-std::string Marks(const BenchReport& report, const LogAxis& x, const LogAxis& y) {
+std::string Marks(const BenchReport& report, const PlotAxis& x, const PlotAxis& y) {
   std::string svg;
   for (const BenchRow& row : report.rows) {
     if (row.threads != report.floors.back().threads || row.angular_error_deg.count == 0) {
@@ -141,28 +106,28 @@ std::string TextReport(const BenchReport& report) {
 }
 
 std::string SvgPlot(const BenchReport& report) {
-  const LogAxis x{0, 4, 70.0, 660.0};
-  const LogAxis y{-7, 1, 400.0, 40.0};
+  const PlotAxis x{1.0, 1e4, 70.0, 660.0, true};
+  const PlotAxis y{1e-7, 10.0, 400.0, 40.0, true};
   const BenchFloor& floor = report.floors.back();
   std::string svg =
       "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"780\" height=\"460\" "
       "font-family=\"sans-serif\" font-size=\"12\">\n"
       "<rect width=\"780\" height=\"460\" fill=\"#ffffff\"/>\n";
-  svg += Text(365.0, 22.0, "middle",
-              fmt::format("{} near lights, {} threads, {}: lower left is better", report.lights,
-                          floor.threads, report.instruction_set));
-  svg += Grid(x, y);
-  svg += Line(x.At(floor.ns_per_pixel), y.begin, x.At(floor.ns_per_pixel), y.end,
-              "stroke=\"#888888\" stroke-dasharray=\"4 3\"");
-  svg += Text(x.At(floor.ns_per_pixel) + 4.0, y.end + 12.0, "start", "memory bandwidth");
+  svg += SvgText(365.0, 22.0, "middle",
+                 fmt::format("{} near lights, {} threads, {}: lower left is better", report.lights,
+                             floor.threads, report.instruction_set));
+  svg += SvgGrid(x, y, "", "");
+  svg += SvgLine(x.At(floor.ns_per_pixel), y.begin_px, x.At(floor.ns_per_pixel), y.end_px,
+                 "stroke=\"#888888\" stroke-dasharray=\"4 3\"");
+  svg += SvgText(x.At(floor.ns_per_pixel) + 4.0, y.end_px + 12.0, "start", "memory bandwidth");
   svg += Marks(report, x, y);
   for (size_t i = 0; i < kCases.size(); ++i) {
     const double at = 60.0 + 20.0 * static_cast<double>(i);
     svg += fmt::format("<circle cx=\"690\" cy=\"{:.1f}\" r=\"5\" fill=\"{}\"/>\n", at - 4.0,
                        kCases[i].color);
-    svg += Text(702.0, at, "start", kCases[i].name, kCases[i].color);
+    svg += SvgText(702.0, at, "start", kCases[i].name, kCases[i].color);
   }
-  svg += Text(365.0, 440.0, "middle", "time [ns/pixel]");
+  svg += SvgText(365.0, 440.0, "middle", "time [ns/pixel]");
   svg +=
       "<text transform=\"translate(18 220) rotate(-90)\" text-anchor=\"middle\" "
       "fill=\"#333333\">mean angular error [degrees]</text>\n</svg>\n";

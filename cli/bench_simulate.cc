@@ -1,8 +1,5 @@
 #include "cli/bench_simulate.h"
 
-#include <sys/resource.h>
-#include <unistd.h>
-
 #include <algorithm>
 #include <chrono>
 #include <filesystem>
@@ -13,6 +10,7 @@
 #include "cli/bench_simulate_report.h"
 #include "cli/pictures.h"
 #include "cli/scene_switches.h"
+#include "cli/scratch_folder.h"
 #include "imaging/dng.h"
 #include "imaging/image_io.h"
 #include "imaging/raw.h"
@@ -25,40 +23,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kBytesPerGb = 1e9;
 constexpr int kRepeats = 2;         // of a switch; the faster counts
 constexpr int kBenchPanelPx = 171;  // of a picture of two or three
 constexpr double kFullScale = 0.8;  // radiance that saturates the sensor
-
-// A folder of its own for the frames, removed with all in it.
-class ScratchFolder {
- public:
-  ScratchFolder()
-      : path_(fs::temp_directory_path() / fmt::format("sateen-bench-simulate-{}", getpid())) {}
-  ScratchFolder(const ScratchFolder&) = delete;
-  ScratchFolder& operator=(const ScratchFolder&) = delete;
-  ~ScratchFolder() {
-    std::error_code ignored;
-    fs::remove_all(path_, ignored);
-  }
-  [[nodiscard]] Status Create() const {
-    std::error_code error;
-    fs::create_directory(path_, error);
-    return error ? Status(Fail(ErrorCode::kIo, "{}: cannot be created: {}; set TMPDIR",
-                               path_.string(), error.message()))
-                 : Status();
-  }
-  [[nodiscard]] const fs::path& Path() const { return path_; }
-
- private:
-  fs::path path_;
-};
-
-double PeakMemoryGb() {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  return static_cast<double>(usage.ru_maxrss) * 1024.0 / kBytesPerGb;
-}
 
 // Adds the seconds that `run` takes to `seconds`.
 template <typename Run>
@@ -118,7 +85,7 @@ class SimulateBench {
 
   // What `sateen simulate` does for a RAW session, step by step.
   Status MeasureSession() {
-    const ScratchFolder scratch;
+    const ScratchFolder scratch("bench-simulate");
     Result<Scene> scene = scratch.Create().and_then([&] { return PlainScene(report_.size); });
     Sensor sensor = *SensorNamed("nikon-d5100");
     sensor.full_scale = kFullScale;

@@ -29,7 +29,7 @@ struct BenchCase {
   RenderedRelief rendered;
 };
 
-// Ten near lights each. Clean has exact radiance; noisy a 14-bit sensor; hard adds slopes to 75
+// Ten near lights each, but "led" and "led+field". Clean has exact radiance, as those have; noisy a 14-bit sensor; hard adds slopes to 75
 // degrees, saturated highlights and lights huddled 20 degrees around the zenith; subnormal is clean
 // at 1e-40 of its radiance.
 Result<std::vector<BenchCase>> RenderCases(ImageSize size, const Task& task) {
@@ -45,9 +45,12 @@ Result<std::vector<BenchCase>> RenderCases(ImageSize size, const Task& task) {
   ReliefScene hard = noisy;
   hard.max_slope_rad = 75.0 * kRadPerDeg;
   hard.sensor->full_scale = 0.6;
-  std::vector<BenchCase> cases = {
-      {"clean", rig, {}}, {"noisy", rig, {}}, {"hard", std::move(huddled), {}}};
-  const std::array scenes = {clean, noisy, hard};
+  std::vector<BenchCase> cases = {{"clean", rig, {}},
+                                  {"noisy", rig, {}},
+                                  {"hard", std::move(huddled), {}},
+                                  {"led", RingRig(size, LightModel::kLed), {}},
+                                  {"led+field", RingRig(size, LightModel::kLedField), {}}};
+  const std::array scenes = {clean, noisy, hard, clean, clean};
   for (size_t i = 0; i < cases.size(); ++i) {
     Result<RenderedRelief> rendered = RenderRelief(scenes[i], cases[i].rig, size, task);
     if (!rendered) {

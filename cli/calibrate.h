@@ -3,14 +3,24 @@
 #include <CLI/CLI.hpp>
 #include <iosfwd>
 
+#include "cli/calibrate_check.h"
+#include "cli/calibrate_lens.h"
 #include "cli/calibrate_lights.h"
+#include "cli/calibrate_pose.h"
+#include "cli/calibrate_response.h"
+#include "cli/calibrate_spheres.h"
 #include "core/task.h"
 
 namespace sateen::cli {
 
 // What the subcommands of `sateen calibrate` are given; one of them runs.
 struct CalibrateArgs {
+  CalibrateLensArgs lens;
+  CalibratePoseArgs pose;
   CalibrateLightsArgs lights;
+  CalibrateResponseArgs response;
+  CalibrateSpheresArgs spheres;
+  CalibrateCheckArgs check;
 };
 
 void AddCalibrate(CLI::App& app, CalibrateArgs& args);

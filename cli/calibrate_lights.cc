@@ -24,18 +24,19 @@ namespace fs = std::filesystem;
 constexpr double kPoorDirectionDeg = 0.02;  // above which tilted sheets are asked for
 constexpr double kPoorPositionMm = 0.3;
 constexpr double kManyLeftOut = 0.1;  // share of the samples
+constexpr double kOneLamp =
+    0.25;  // of the distance between two lights: fitted closer, they are one
 constexpr int kResidualPanelPx = 240;
 constexpr int kResidualColumns = 5;
 constexpr float kPercent = 100.0F;
 
-double DirectionErrorDeg(const Light& a, const Light& b, const std::vector<SheetSample>& samples) {
-  double worst = 0.0;
-  for (const SheetSample& sample : samples) {
-    const Eigen::Vector3d la = IncidentAt(a, sample.point_mm).l;
-    const Eigen::Vector3d lb = IncidentAt(b, sample.point_mm).l;
-    worst = std::max(worst, std::atan2(la.cross(lb).norm(), la.dot(lb)));
+LightModel HighestRung(std::string_view name) {
+  for (const LightModel model : {LightModel::kNear, LightModel::kLed}) {
+    if (name == Name(model)) {
+      return model;
+    }
   }
-  return worst / kRadPerDeg;
+  return LightModel::kLedField;
 }
 
 class LightsCalibrator {
@@ -47,7 +48,7 @@ class LightsCalibrator {
     const Status status = ReadSheets()
                               .and_then([&] { return FitAll(); })
                               .and_then([&] { return CheckSwapped(); })
-                              .and_then([&] { return CompareWithTruth(); })
+                              .and_then([&] { return Compare(); })
                               .and_then([&] { return Draw(); });
     if (!status) {
       return tl::unexpected(status.error());
@@ -61,8 +62,9 @@ class LightsCalibrator {
  private:
   Status ReadSheets() {
     ReadSheetOptions options;
-    if (!args_.rough_rig.empty()) {
-      options.rig_file = args_.rough_rig;
+    options.rig_file = RigFileToBeginWith(args_.rough_rig, args_.output);
+    if (Status status = ReadBorder(options); !status) {
+      return status;
     }
     for (const fs::path& dir : args_.sheets) {
       Result<Sheet> sheet = ReadSheet(dir, options, task_);
@@ -77,9 +79,44 @@ class LightsCalibrator {
       result_.sha256_of_input.merge(sheet->sha256_of_input);
       result_.warnings.insert(result_.warnings.end(), sheet->warnings.begin(),
                               sheet->warnings.end());
+      if (Status status = NotePose(dir, *sheet); !status) {
+        return status;
+      }
       sheets_.push_back(std::move(*sheet));
     }
     result_.rig = sheets_[0].rig;
+    return {};
+  }
+
+  Status ReadBorder(ReadSheetOptions& options) const {
+    if (args_.border.empty()) {
+      return {};
+    }
+    Result<SheetBorder> border = ParseSheetBorder(args_.border);
+    if (!border) {
+      return tl::unexpected(border.error());
+    }
+    options.border = *std::move(border);
+    options.find_poses = args_.find_poses;
+    return {};
+  }
+
+  // What is known of the sheet's pose, for the report and the warnings.
+  Status NotePose(const fs::path& dir, const Sheet& sheet) {
+    if (!sheet.found_pose && !sheet.pose_is_recorded && !sheets_.empty()) {
+      result_.warnings.push_back(
+          fmt::format("{}: its pose is neither recorded nor found, so it is taken to lie flat on "
+                      "the table; name its marker border with --border",
+                      dir.string()));
+    }
+    if (!sheet.found_pose) {
+      return {};
+    }
+    Result<SheetFigures> figures = FiguresOfSheet(dir, sheet);
+    if (!figures) {
+      return tl::unexpected(figures.error());
+    }
+    result_.sheets.push_back(*std::move(figures));
     return {};
   }
 
@@ -92,9 +129,8 @@ class LightsCalibrator {
   }
 
   Status FitAll() {
-    const LightFitOptions options{
-        .albedo = args_.albedo,
-        .highest_rung = args_.highest_rung == "near" ? LightModel::kNear : LightModel::kLed};
+    const LightFitOptions options{.albedo = args_.albedo,
+                                  .highest_rung = HighestRung(args_.highest_rung)};
     const size_t count = result_.rig.lights.size();
     std::vector<Result<LightFit>> fits(count);
     task_.BeginStage("fitting lights", static_cast<int>(count));
@@ -134,17 +170,29 @@ class LightsCalibrator {
     };
     for (size_t k = 0; k < rough.size(); ++k) {
       const size_t other = nearest(k);
-      if (other != k && nearest(other) != other) {
+      const double apart_mm = (rough[k].position_mm - rough[other].position_mm).norm();
+      const double fitted_apart_mm =
+          (result_.rig.lights[k].position_mm - result_.rig.lights[other].position_mm).norm();
+      if (other != k && (nearest(other) != other || fitted_apart_mm < kOneLamp * apart_mm)) {
         return Fail(ErrorCode::kBadData,
                     "the frame of light '{}' is lit from where light '{}' is expected, {:.0f} mm "
-                    "from its own place: are frames or cables swapped?",
+                    "from its own place: are frames or cables swapped, or one frame there twice?",
                     rough[k].name, rough[other].name, result_.lights[k].moved_mm);
       }
     }
     return {};
   }
 
-  Status CompareWithTruth() {
+  Status Compare() {
+    Lights truth;
+    if (Status status = CompareWithTruth(truth); !status) {
+      return status;
+    }
+    result_.ways = CompareWays(sheets_, result_.rig.lights, truth, args_.albedo);
+    return task_.CheckCancelled();
+  }
+
+  Status CompareWithTruth(Lights& truth_lights) {
     const fs::path path = args_.sheets[0] / "truth" / "rig.json";
     std::error_code ignored;
     if (!fs::exists(path, ignored)) {
@@ -154,10 +202,11 @@ class LightsCalibrator {
     if (!truth) {
       return tl::unexpected(truth.error());
     }
+    truth_lights = Rebalanced(truth->lights, WhiteBalanceOf(*truth), WhiteBalanceOf(result_.rig));
     for (size_t k = 0; k < result_.lights.size(); ++k) {
       const Light& fitted = result_.rig.lights[k];
-      const auto light = std::ranges::find(truth->lights, fitted.name, &Light::name);
-      if (light == truth->lights.end()) {
+      const auto light = std::ranges::find(truth_lights, fitted.name, &Light::name);
+      if (light == truth_lights.end()) {
         continue;
       }
       LightFigures& figures = result_.lights[k];
@@ -224,6 +273,12 @@ class LightsCalibrator {
   }
 
   void Warn() {
+    for (size_t s = 0; s < sheets_.size(); ++s) {
+      if (auto fault =
+              FaultOfSheet(args_.sheets[s], sheets_[s], result_.rig.lights, args_.albedo)) {
+        result_.warnings.push_back(*std::move(fault));
+      }
+    }
     double direction_deg = 0.0;
     double position_mm = 0.0;
     for (const LightFigures& figures : result_.lights) {
@@ -266,10 +321,19 @@ void AddCalibrateLights(CLI::App& calibrate, CalibrateLightsArgs& args) {
       ->required();
   cmd->add_option("-o,--output", args.output, "Rig file to write; a former one is kept as a copy")
       ->required();
+  CLI::Option* border =
+      cmd->add_option("--border", args.border,
+                      "Marker border printed on the sheets, such as sheet:A4:12mm (sateen board "
+                      "print); tells where they lie where sessions have no table_from_sheet");
+  cmd->add_flag("--find-poses", args.find_poses,
+                "Find poses by the border also where sessions have table_from_sheet")
+      ->needs(border);
   cmd->add_option("--rig", args.rough_rig,
-                  "Rough rig: camera, and lights to within some 50 mm; the session's own");
-  cmd->add_option("--model", args.highest_rung, "Highest rung of the model ladder: near or led")
-      ->check(CLI::IsMember({"near", "led"}))
+                  "Rough rig: camera, and lights to within some 50 mm; default: what is at -o, or "
+                  "else the session's own");
+  cmd->add_option("--model", args.highest_rung,
+                  "Highest rung of the model ladder: near, led or led+field")
+      ->check(CLI::IsMember({"near", "led", "led+field"}))
       ->capture_default_str();
   cmd->add_option("--albedo", args.albedo, "Albedo of the paper, above 0 and up to 1")
       ->capture_default_str();

@@ -9,6 +9,8 @@
 #include <vector>
 
 #include "calibration/light_fit.h"
+#include "cli/calibrate_lights_compare.h"
+#include "cli/sheet_figures.h"
 #include "core/task.h"
 #include "rig/rig.h"
 
@@ -18,7 +20,9 @@ struct CalibrateLightsArgs {
   std::vector<std::filesystem::path> sheets;
   std::filesystem::path output;  // the rig file
   std::filesystem::path rough_rig;
-  std::string highest_rung = "led";
+  std::string border;       // what is printed on the sheets; empty: nothing
+  bool find_poses = false;  // by the border, also where sessions record them
+  std::string highest_rung = "led+field";
   double albedo = 0.99;
   int threads = 0;
   bool json = false;
@@ -36,7 +40,9 @@ struct LightFigures {
 
 struct LightsCalibration {
   Rig rig;
+  std::vector<SheetFigures> sheets;  // those whose pose was found by the border
   std::vector<LightFigures> lights;  // in the rig's order
+  std::vector<WayFigures> ways;      // this fit is the last
   std::vector<std::string> warnings;
   std::map<std::string, std::string> sha256_of_input;
   std::filesystem::path pictures;

@@ -34,13 +34,41 @@ nlohmann::json FiguresOf(const LightFigures& figures) {
   return json;
 }
 
-const RungFit& ChosenRung(const LightFit& fit) {
-  for (const RungFit& rung : fit.rungs) {
-    if (rung.light.model == fit.light.model) {
-      return rung;
+nlohmann::json FiguresOf(const WayFigures& way) {
+  nlohmann::json json = {{"way", way.key}};
+  const auto add = [&](std::string_view key, const std::optional<double>& value) {
+    if (value) {
+      json[std::string(key)] = *value;
     }
+  };
+  add("flat_sheet_deg", way.flat_deg);
+  add("tilted_sheets_deg", way.tilted_deg);
+  add("direction_error_deg", way.direction_error_deg);
+  return json;
+}
+
+// How flat the sheets solve, one line for each way to calibrate.
+std::string WaysTable(const std::vector<WayFigures>& ways) {
+  const auto cell = [](const std::optional<double>& value) {
+    return value ? fmt::format("{:.3f} deg", *value) : std::string("-");
+  };
+  std::string text = fmt::format("\n{:<32} {:>14} {:>14} {:>16}\n", "off by, edge to edge",
+                                 "flat sheet", "tilted sheets", "lights, truth");
+  for (const WayFigures& way : ways) {
+    text += fmt::format("{:<32} {:>14} {:>14} {:>16}\n", way.label, cell(way.flat_deg),
+                        cell(way.tilted_deg), cell(way.direction_error_deg));
   }
-  return fit.rungs.back();
+  return text + "\n";
+}
+
+// What each rung left of the held-out samples, in units of the noise: "near 75.1, led 1.01".
+std::string RungsOf(const LightFit& fit) {
+  std::vector<std::string> rungs;
+  for (const RungFit& rung : fit.rungs) {
+    rungs.push_back(
+        fmt::format("{} {:.3g}", Name(rung.light.model), rung.held_out_rms / fit.noise_rms));
+  }
+  return fmt::format("{}", fmt::join(rungs, ", "));
 }
 
 }  // namespace
@@ -55,27 +83,38 @@ std::string JsonReport(const CalibrateLightsArgs& args, const LightsCalibration&
                            {"seconds", result.seconds},
                            {"warnings", result.warnings},
                            {"inputs", result.sha256_of_input},
+                           {"sheets", SheetsJson(result.sheets)},
                            {"lights", nlohmann::json::array()}};
   for (const LightFigures& figures : result.lights) {
     report["lights"].push_back(FiguresOf(figures));
+  }
+  report["ways"] = nlohmann::json::array();
+  for (const WayFigures& way : result.ways) {
+    report["ways"].push_back(FiguresOf(way));
   }
   return report.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 
 std::string TextReport(const CalibrateLightsArgs& args, const LightsCalibration& result) {
-  std::string text = fmt::format("{:<10} {:<5} {:>9} {:>13} {:>14} {:>8} {:>15} {:>9}\n", "light",
-                                 "model", "moved mm", "position +- mm", "direction +-", "flux +-",
-                                 "misfit / noise", "left out");
+  std::string text = SheetsTable(result.sheets);
+  text += fmt::format("{:<10} {:<9} {:>9} {:>14} {:>14} {:>8} {:>9}  {}\n", "light", "model",
+                      "moved mm", "position +- mm", "direction +-", "flux +-", "left out",
+                      "misfit / noise");
   bool has_truth = false;
   for (const LightFigures& figures : result.lights) {
     const LightFit& fit = figures.fit;
     text += fmt::format(
-        "{:<10} {:<5} {:>9.2f} {:>14.3f} {:>10.4f} deg {:>6.3f} % {:>15.2f} {:>7.1f} %\n",
-        fit.light.name, Name(fit.light.model), figures.moved_mm, fit.position_sd_mm.norm(),
+        "{:<10} {:<9} {:>9.2f} {:>14.3f} {:>10.4f} deg {:>6.3f} % {:>7.1f} %  {}\n", fit.light.name,
+        Name(fit.light.model), figures.moved_mm, fit.position_sd_mm.norm(),
         fit.direction_sd_rad / kRadPerDeg, 100.0 * fit.flux_sd.maxCoeff(),
-        ChosenRung(fit).held_out_rms / fit.noise_rms,
-        100.0 * static_cast<double>(fit.left_out) / static_cast<double>(fit.left_out + fit.used));
+        100.0 * static_cast<double>(fit.left_out) / static_cast<double>(fit.left_out + fit.used),
+        RungsOf(fit));
     has_truth = has_truth || figures.position_error_mm.has_value();
+  }
+  text += WaysTable(result.ways);
+  if (!result.ways.empty() && result.ways.back().flat_deg) {
+    text += fmt::format("the flat sheet solves flat to {:.3f} degrees edge to edge\n",
+                        *result.ways.back().flat_deg);
   }
   if (has_truth) {
     double position_mm = 0.0;

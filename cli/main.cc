@@ -4,11 +4,11 @@
 #include <iostream>
 #include <new>
 
+#include "cli/bench_calibrate.h"
 #include "cli/bench_simulate.h"
 #include "cli/bench_solve.h"
+#include "cli/board.h"
 #include "cli/calibrate.h"
-#include "cli/devices.h"
-#include "cli/light.h"
 #include "cli/simulate.h"
 #include "cli/solve.h"
 #include "core/interrupt.h"
@@ -33,16 +33,16 @@ int Run(int argc, char** argv) {
   sateen::cli::AddSimulate(app, simulate);
   sateen::cli::CalibrateArgs calibrate;
   sateen::cli::AddCalibrate(app, calibrate);
-  sateen::cli::LightArgs light;
-  sateen::cli::AddLight(app, light);
-  sateen::cli::DevicesArgs devices;
-  sateen::cli::AddDevices(app, devices);
+  sateen::cli::BoardPrintArgs board_print;
+  sateen::cli::AddBoard(app, board_print);
   CLI::App* bench = app.add_subcommand("bench", "Measure speed against error on this machine");
   bench->require_subcommand(1);
   sateen::cli::BenchSolveArgs bench_solve;
   sateen::cli::AddBenchSolve(*bench, bench_solve);
   sateen::cli::BenchSimulateArgs bench_simulate;
   sateen::cli::AddBenchSimulate(*bench, bench_simulate);
+  sateen::cli::BenchCalibrateArgs bench_calibrate;
+  sateen::cli::AddBenchCalibrate(*bench, bench_calibrate);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
@@ -59,12 +59,12 @@ int Run(int argc, char** argv) {
     status = RunSimulate(simulate, task, std::cout, std::cerr);
   } else if (app.got_subcommand("calibrate")) {
     status = RunCalibrate(app, calibrate, task, std::cout, std::cerr);
-  } else if (app.got_subcommand("light")) {
-    status = RunLight(light, task, std::cout, std::cerr);
-  } else if (app.got_subcommand("devices")) {
-    status = RunDevices(devices, task, std::cout, std::cerr);
+  } else if (app.got_subcommand("board")) {
+    status = RunBoardPrint(board_print, task, std::cout, std::cerr);
   } else if (bench->got_subcommand("simulate")) {
     status = RunBenchSimulate(bench_simulate, task, std::cout, std::cerr);
+  } else if (bench->got_subcommand("calibrate")) {
+    status = RunBenchCalibrate(bench_calibrate, task, std::cout, std::cerr);
   } else {
     status = RunBenchSolve(bench_solve, task, std::cout, std::cerr);
   }

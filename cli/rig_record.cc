@@ -25,6 +25,9 @@ void RecordCalibration(Rig& rig, std::string_view kind, nlohmann::json figures,
   if (!rig.calibration_json.empty()) {
     all = nlohmann::json::parse(rig.calibration_json, nullptr, /*allow_exceptions=*/false);
   }
+  for (const char* key : {"output", "former_rig", "pictures"}) {
+    figures.erase(key);  // names of one machine, and of one moment
+  }
   figures["date"] = TimeAs("%Y-%m-%dT%H:%M:%SZ");
   figures["version"] = SATEEN_VERSION;
   figures["inputs"] = sha256_of_input;
@@ -32,13 +35,44 @@ void RecordCalibration(Rig& rig, std::string_view kind, nlohmann::json figures,
   rig.calibration_json = all.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 
-Result<std::filesystem::path> ReplaceRig(const std::filesystem::path& path, const Rig& rig) {
+Result<Rig> RigToBeginWith(const std::filesystem::path& rig_file,
+                           const std::filesystem::path& output) {
+  const std::filesystem::path& path = rig_file.empty() ? output : rig_file;
+  std::error_code error;
+  if (rig_file.empty() && !std::filesystem::exists(output, error)) {
+    return Rig();
+  }
+  return ReadRig(path);
+}
+
+std::optional<std::filesystem::path> RigFileToBeginWith(const std::filesystem::path& rig_file,
+                                                        const std::filesystem::path& output) {
+  const std::filesystem::path& path = rig_file.empty() ? output : rig_file;
+  std::error_code error;
+  if (rig_file.empty() && !std::filesystem::exists(output, error)) {
+    return std::nullopt;
+  }
+  return path;
+}
+
+nlohmann::json RecordedFigure(const Rig& rig, const std::string& kind, const std::string& figure) {
+  const nlohmann::json all =
+      nlohmann::json::parse(rig.calibration_json, nullptr, /*allow_exceptions=*/false);
+  const auto of_kind = all.is_object() ? all.find(kind) : all.end();
+  if (!all.is_object() || of_kind == all.end() || !of_kind->is_object()) {
+    return nullptr;
+  }
+  return of_kind->value(figure, nlohmann::json(nullptr));
+}
+
+Result<std::filesystem::path> ReplaceFile(const std::filesystem::path& path,
+                                          const std::string& text) {
   std::filesystem::path former;
   std::error_code error;
   if (std::filesystem::exists(path, error)) {
-    const Result<std::string> text = ReadFileBytes(path);
-    if (!text) {
-      return tl::unexpected(text.error());
+    const Result<std::string> kept = ReadFileBytes(path);
+    if (!kept) {
+      return tl::unexpected(kept.error());
     }
     const std::string stem = path.stem().string() + "-" + TimeAs("%Y%m%dT%H%M%SZ");
     former = path;
@@ -46,14 +80,21 @@ Result<std::filesystem::path> ReplaceRig(const std::filesystem::path& path, cons
     for (int again = 2; std::filesystem::exists(former, error); ++again) {
       former.replace_filename(fmt::format("{}-{}{}", stem, again, path.extension().string()));
     }
-    if (Status status = WriteFileWhole(former, *text); !status) {
+    if (Status status = WriteFileWhole(former, *kept); !status) {
       return tl::unexpected(status.error());
     }
   }
-  if (Status status = WriteFileWhole(path, RigToJson(rig)); !status) {
+  if (Status status = WriteFileWhole(path, text); !status) {
     return tl::unexpected(status.error());
   }
   return former;
+}
+
+Result<std::filesystem::path> ReplaceRig(const std::filesystem::path& path, const Rig& rig) {
+  if (Status status = rig.Validate(path.string()); !status) {
+    return tl::unexpected(status.error());
+  }
+  return ReplaceFile(path, RigToJson(rig));
 }
 
 }  // namespace sateen::cli

@@ -64,7 +64,13 @@ Status ReadSensor(JsonReader reader, Sensor& sensor) {
   }
   sensor.black_dn = reader.OptionalNumber("black").value_or(sensor.black_dn);
   sensor.white_dn = reader.OptionalNumber("white").value_or(sensor.white_dn);
+  sensor.saturation_dn = reader.OptionalNumber("saturation");
   sensor.full_scale = reader.OptionalNumber("full_scale").value_or(sensor.full_scale);
+  if (const auto sensitivity = reader.OptionalNumbers("sensitivity_rgb", 3)) {
+    sensor.sensitivity_rgb = {(*sensitivity)[0], (*sensitivity)[1], (*sensitivity)[2]};
+  }
+  sensor.knee = reader.OptionalNumber("knee").value_or(sensor.knee);
+  sensor.compression = reader.OptionalNumber("compression").value_or(sensor.compression);
   if (const auto bayer = reader.OptionalString("bayer")) {
     const auto cfa = BayerNamed(*bayer);
     reader.Require(cfa.has_value(), "bayer",
@@ -83,12 +89,20 @@ Status ReadExposure(JsonReader reader, ExposureRecord& exposure) {
   exposure.exposure_s = reader.Number("exposure_s");
   exposure.f_number = reader.Number("f_number");
   exposure.iso = reader.Number("iso");
+  exposure.series_s = reader.OptionalNumberList("series_s").value_or(std::vector<double>());
+  exposure.series_light = reader.OptionalString("series_light").value_or("");
+  exposure.repeats = reader.OptionalInteger("repeats").value_or(1);
   // What a DNG file can hold.
   const auto require = [&](std::string_view key, bool holds, double value, std::string_view range) {
     reader.Require(holds, key, fmt::format("{:g}; need {}", value, range));
   };
   require("exposure_s", exposure.exposure_s >= 1e-6 && exposure.exposure_s <= 1e5,
           exposure.exposure_s, "1e-6 to 1e5");
+  for (const double time_s : exposure.series_s) {
+    require("series_s", time_s >= 1e-6 && time_s <= 1e5, time_s, "1e-6 to 1e5 each");
+  }
+  require("repeats", exposure.repeats >= 1 && exposure.repeats <= 100, exposure.repeats,
+          "1 to 100");
   require("f_number", exposure.f_number >= 0.01 && exposure.f_number <= 1e4, exposure.f_number,
           "0.01 to 1e4");
   require(
@@ -131,8 +145,6 @@ Result<SceneFile> ReadSceneFile(const std::filesystem::path& path) {
     file.scene.seed = static_cast<uint64_t>(std::max(*seed, 0));
   }
   JsonReader surface = top.Object("surface");
-  const std::string shape = surface.OptionalString("shape").value_or("");
-  const bool is_plane = shape == "plane" || shape == "tilted-plane";
   JsonReader materials = top.Object("materials");
   std::optional<JsonReader> illumination = top.OptionalObject("illumination");
   std::optional<JsonReader> lens = top.OptionalObject("lens");
@@ -176,17 +188,28 @@ Result<SceneFile> ReadSceneFile(const std::filesystem::path& path) {
   if (status = InFile(file.scene.Validate(), path); !status) {
     return tl::unexpected(status.error());
   }
-  if (file.kind == SessionKind::kSheet && !is_plane) {
+  if (file.kind != SessionKind::kChart &&
+      (!file.exposure.series_s.empty() || file.exposure.repeats > 1)) {
+    return Fail(ErrorCode::kBadData,
+                "{}: exposure.{} is for kind chart alone: other sessions have one frame of a light",
+                path.string(), file.exposure.series_s.empty() ? "repeats" : "series_s");
+  }
+  const Lights& lights = file.scene.rig.lights;
+  if (!file.exposure.series_light.empty() &&
+      std::ranges::find(lights, file.exposure.series_light, &Light::name) == lights.end()) {
+    return Fail(ErrorCode::kBadData, "{}: exposure.series_light is '{}', which the rig has not",
+                path.string(), file.exposure.series_light);
+  }
+  if (file.kind == SessionKind::kSheet && !file.scene.surface->IsPlane()) {
     return Fail(ErrorCode::kBadData,
                 "{}: surface.shape is no plane, but kind is sheet; need plane or tilted-plane",
                 path.string());
   }
-  if (file.kind == SessionKind::kSheet) {
-    file.table_from_sheet = Eigen::Isometry3d::Identity();
-    file.table_from_sheet->linear() =
-        Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(),
-                                           file.scene.surface->At(0.0, 0.0).Normal())
-            .toRotationMatrix();
+  if (const auto* print = std::get_if<PrintAlbedo>(&file.scene.materials[0].albedo)) {
+    file.target_is_printed = true;
+    file.table_from_target = print->table_from_print;
+  } else if (file.kind == SessionKind::kSheet) {
+    file.table_from_target = TableFromPlane(*file.scene.surface);
   }
   return file;
 }

@@ -18,16 +18,21 @@ struct ExposureRecord {
   double exposure_s = 0.02;
   double f_number = 8.0;
   double iso = 100.0;
+  // A chart: exposure times, each as bright as its time says; empty: exposure_s alone.
+  std::vector<double> series_s = {};
+  std::string series_light;  // the light that has the series; empty: all
+  int repeats = 1;           // frames of each kind
 };
 
 struct SceneFile {
-  std::string title;
-  SessionKind kind = SessionKind::kFabric;
+  std::optional<Eigen::Isometry3d> table_from_target;  // of a sheet, and of what is printed
   Scene scene;
-  Sensor sensor;
+  std::vector<std::filesystem::path> inputs;  // the scene file and the rig
+  std::string title;
   ExposureRecord exposure;
-  std::vector<std::filesystem::path> inputs;          // the scene file and the rig
-  std::optional<Eigen::Isometry3d> table_from_sheet;  // of a sheet: the plane that was rendered
+  Sensor sensor;
+  SessionKind kind = SessionKind::kFabric;
+  bool target_is_printed = false;  // so that frames tell its pose, and their record need not
 };
 
 /// Reads a scene file, schema sateen.scene/1 (docs/simulation.md).

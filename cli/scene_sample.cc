@@ -50,12 +50,14 @@ Result<SurfacePtr> ReadSurface(JsonReader& reader, const std::filesystem::path& 
     return make();
   };
   if (shape == "plane") {
-    return finished([] { return MakePlane(0.0, 0.0); });
+    const double height_mm = reader.OptionalNumber("height_mm").value_or(0.0);
+    return finished([&] { return MakePlane(0.0, 0.0, height_mm); });
   }
   if (shape == "tilted-plane") {
     const double slope_rad = Angle(reader, "slope_deg", 0.0, 90.0);
     const double azimuth_rad = Angle(reader, "azimuth_deg", -360.0, 360.0);
-    return finished([&] { return MakePlane(slope_rad, azimuth_rad); });
+    const double height_mm = reader.OptionalNumber("height_mm").value_or(0.0);
+    return finished([&] { return MakePlane(slope_rad, azimuth_rad, height_mm); });
   }
   if (shape == "sphere") {
     const double radius_mm = reader.Number("radius_mm");
@@ -98,27 +100,55 @@ Result<SurfacePtr> ReadSurface(JsonReader& reader, const std::filesystem::path& 
   return finished([&] { return MakeWeave(spec); });
 }
 
+Eigen::Isometry3d TableFromPlane(const Surface& plane) {
+  const SurfacePoint at_origin = plane.At(0.0, 0.0);
+  return Eigen::Translation3d(0.0, 0.0, at_origin.height_mm) *
+         Eigen::Isometry3d(
+             Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), at_origin.Normal()));
+}
+
 namespace {
 
-Status ReadTexture(JsonReader reader, Albedo& albedo) {
+// A print lies in the plane; on another shape it is seen from above.
+Status ReadPrint(JsonReader& reader, const Surface& surface, Albedo& albedo) {
+  const std::string target = reader.String("target");
+  const double dark = reader.Number("dark");
+  const double light = reader.Number("light");
+  const std::optional<double> beyond = reader.OptionalNumber("beyond");
+  const auto offset_mm = reader.OptionalNumbers("offset_mm", 2).value_or(std::vector{0.0, 0.0});
+  const double turn_rad = reader.Has("turn_deg") ? Angle(reader, "turn_deg", -360.0, 360.0) : 0.0;
+  Result<Print> print = PrintNamed(target);
+  reader.Require(print.has_value(), "target", print ? "" : print.error().message);
+  if (Status status = reader.Finish(); !status) {
+    return status;
+  }
+  const Eigen::Isometry3d table_from_surface =
+      surface.IsPlane() ? TableFromPlane(surface) : Eigen::Isometry3d::Identity();
+  albedo = PrintAlbedo{.print = *std::move(print),
+                       .table_from_print = table_from_surface *
+                                           Eigen::Translation3d(offset_mm[0], offset_mm[1], 0.0) *
+                                           Eigen::AngleAxisd(turn_rad, Eigen::Vector3d::UnitZ()),
+                       .dark = dark,
+                       .light = light,
+                       .beyond = beyond};
+  return {};
+}
+
+Status ReadTexture(JsonReader reader, const Surface& surface, Albedo& albedo) {
   const std::string kind = reader.String("kind");
   if (kind == "waves") {
     albedo = WavyAlbedo{.min = reader.Number("min"),
                         .max = reader.Number("max"),
                         .period_mm = reader.Number("period_mm")};
-  } else if (kind == "chessboard") {
-    albedo = ChessboardAlbedo{.columns = reader.Integer("columns"),
-                              .rows = reader.Integer("rows"),
-                              .square_mm = reader.Number("square_mm"),
-                              .dark = reader.Number("dark"),
-                              .light = reader.Number("light")};
+  } else if (kind == "print") {
+    return ReadPrint(reader, surface, albedo);
   } else if (kind == "patches") {
     const int count = reader.Integer("count");
     albedo =
         PatchesAlbedo{.values = reader.Numbers("values", static_cast<size_t>(std::max(count, 0))),
                       .patch_mm = reader.Number("patch_mm")};
   } else {
-    reader.Require(false, "kind", fmt::format("'{}'; need waves, chessboard or patches", kind));
+    reader.Require(false, "kind", fmt::format("'{}'; need waves, print or patches", kind));
   }
   return reader.Finish();
 }
@@ -157,7 +187,7 @@ Result<std::shared_ptr<const Brdf>> ReadSpecular(JsonReader reader) {
   return tl::unexpected(reader.Finish().error());
 }
 
-Result<Material> ReadMaterial(JsonReader reader) {
+Result<Material> ReadMaterial(JsonReader reader, const Surface& surface) {
   Material material;
   const std::optional<std::vector<double>> rgb = reader.OptionalNumbers("albedo", 3);
   std::optional<JsonReader> texture = reader.OptionalObject("texture");
@@ -170,7 +200,7 @@ Result<Material> ReadMaterial(JsonReader reader) {
   }
   if (rgb) {
     material.albedo = ConstantAlbedo{Eigen::Vector3d(rgb->data())};
-  } else if (Status status = ReadTexture(std::move(*texture), material.albedo); !status) {
+  } else if (Status status = ReadTexture(std::move(*texture), surface, material.albedo); !status) {
     return tl::unexpected(status.error());
   }
   if (specular) {
@@ -193,7 +223,7 @@ Status ReadMaterials(JsonReader reader, Scene& scene) {
       continue;
     }
     JsonReader one = reader.Object(part);
-    Result<Material> material = ReadMaterial(std::move(one));
+    Result<Material> material = ReadMaterial(std::move(one), *scene.surface);
     if (!material && material.error().code == ErrorCode::kInvalidArgument) {  // of the BRDF
       return Fail(ErrorCode::kInvalidArgument, "materials.{}.specular.{}", part,
                   material.error().message);

@@ -92,9 +92,10 @@ std::vector<SceneSwitch> SceneSwitches() {
          scene.materials[0].albedo =
              PatchesAlbedo{.values = {0.9, 0.6, 0.36, 0.2, 0.1, 0.03}, .patch_mm = 18.0};
        }},
-      {"samples 3, chessboard", "samples",
+      {"samples 3, print", "samples",
        [](Scene& scene) {
-         scene.materials[0].albedo = ChessboardAlbedo{.columns = 10, .rows = 10, .square_mm = 10.0};
+         scene.materials[0].albedo =
+             PrintAlbedo{.print = PrintOf({.columns = 10, .rows = 10, .square_mm = 10.0})};
          scene.lens.samples = 3;
        }},
       {"bump from the 6th, 12 px", "bump",

@@ -106,7 +106,7 @@ int RunSimulate(const SimulateArgs& args, const Task& task, std::ostream& out, s
     return ExitStatus(file.error());
   }
   const ImageSize size = file->scene.rig.camera->size_px;
-  out << fmt::format("rendered {} lit frames and a dark one of {}x{} px, with truth, to {}\n",
+  out << fmt::format("rendered {} lights and the dark at {}x{} px, with truth, to {}\n",
                      file->scene.rig.lights.size(), size.width, size.height, args.output.string());
   return 0;
 }

@@ -8,6 +8,7 @@
 #include "core/sha256.h"
 #include "imaging/dng.h"
 #include "imaging/image_io.h"
+#include "scanner/pose_json.h"
 #include "simulation/random.h"
 #include "simulation/render.h"
 
@@ -19,13 +20,22 @@ constexpr int kPanelPx = 240;  // width in the overview
 constexpr int kSmallestRawPx = 22;
 constexpr int kPanelColumns = 5;
 constexpr uint64_t kSensorStream = 1000;  // one stream of noise a frame from here on
+constexpr uint64_t kStreamsPerTake = 1'000'000;
+
+// One exposure of a light, or of the dark.
+struct Take {
+  double exposure_s = 0.0;
+  std::string suffix;  // of the file's name: empty where there is only one
+};
 
 class SessionWriter {
  public:
   SessionWriter(const SceneFile& file, FrameFormat format, const Task& task, OutputFolder& folder)
       : file_(file), format_(format), task_(task), folder_(folder) {
     session_.kind = file.kind;
-    session_.table_from_sheet = file.table_from_sheet;
+    if (file.kind == SessionKind::kSheet && !file.target_is_printed) {
+      session_.table_from_sheet = file.table_from_target;
+    }
   }
 
   Status Write() {
@@ -41,6 +51,13 @@ class SessionWriter {
                   "the rig's camera.size_px is [{}, {}]; RAW files need at least {} each: LibRaw "
                   "reads no smaller ones; use --linear",
                   size.width, size.height, kSmallestRawPx);
+    }
+    const ExposureRecord& exposure = file_.exposure;
+    if (format_ == FrameFormat::kLinearExr &&
+        (!exposure.series_s.empty() || exposure.repeats > 1)) {
+      return Fail(ErrorCode::kInvalidArgument,
+                  "exposure.{} is of RAW frames, and --linear gives radiance; use one or the other",
+                  exposure.series_s.empty() ? "repeats" : "series_s");
     }
     RetireFormerSession();
     task_.BeginStage("geometry", file_.scene.rig.camera->size_px.height);
@@ -82,27 +99,63 @@ class SessionWriter {
   }
 
   Status WriteFrame(SceneRenderer& renderer, std::optional<size_t> light) {
-    const std::string name = light ? file_.scene.rig.lights[*light].name : kDarkFrame;
+    const std::string name = NameOf(light);
     task_.BeginStage("rendering " + name, file_.scene.rig.camera->size_px.height);
     const Result<RenderedFrame> frame = renderer.Render(light, task_);
     if (!frame) {
       return tl::unexpected(frame.error());
     }
-    const std::string exr = "frames/" + name + ".exr";
-    const std::string dng = "frames/" + name + ".dng";
-    const bool is_raw = format_ == FrameFormat::kRawDng;
-    folder_.Retire(is_raw ? exr : dng);
-    const std::string& written = is_raw ? dng : exr;
-    const std::filesystem::path staged = folder_.Stage(written);
     if (panels_.empty()) {
       white_ = WhiteOf(frame->radiance);
     }
     panels_.push_back(Shrunk(ShowLinear(frame->radiance, white_), kPanelPx));
-    Status status =
-        is_raw ? WriteRaw(staged, frame->radiance, light) : WriteExr(staged, frame->radiance);
+    Status status;
+    const std::vector<Take> takes = TakesOf(light);
+    for (size_t take = 0; take < takes.size() && status; ++take) {
+      status = WriteTake(frame->radiance, light, takes[take], take);
+    }
     if (status && light) {
       status = WritePng8(folder_.Stage("truth/lit/" + name + ".png"), frame->lit);
     }
+    return status;
+  }
+
+  [[nodiscard]] std::string NameOf(std::optional<size_t> light) const {
+    return light ? file_.scene.rig.lights[*light].name : kDarkFrame;
+  }
+
+  // Every exposure of the series for the lights that have it; the shortest and the longest one for
+  // the dark; each as often as asked.
+  [[nodiscard]] std::vector<Take> TakesOf(std::optional<size_t> light) const {
+    const ExposureRecord& record = file_.exposure;
+    std::vector<double> times_s = record.series_s;
+    const bool has_series =
+        !light || record.series_light.empty() || record.series_light == NameOf(light);
+    if (times_s.empty() || !has_series) {
+      times_s = {record.exposure_s};
+    } else if (!light) {
+      const auto [shortest, longest] = std::ranges::minmax(times_s);
+      times_s = shortest < longest ? std::vector<double>{shortest, longest} : std::vector{longest};
+    }
+    std::vector<Take> takes;
+    for (const double time_s : times_s) {
+      for (int repeat = 1; repeat <= record.repeats; ++repeat) {
+        const bool is_alone = record.series_s.empty() && record.repeats == 1;
+        takes.push_back({time_s, is_alone ? "" : fmt::format("-{:g}s-{}", time_s, repeat)});
+      }
+    }
+    return takes;
+  }
+
+  Status WriteTake(const Image3& radiance, std::optional<size_t> light, const Take& take,
+                   size_t index) {
+    const std::string stem = "frames/" + NameOf(light) + take.suffix;
+    const bool is_raw = format_ == FrameFormat::kRawDng;
+    folder_.Retire(stem + (is_raw ? ".exr" : ".dng"));
+    const std::string written = stem + (is_raw ? ".dng" : ".exr");
+    const std::filesystem::path staged = folder_.Stage(written);
+    Status status =
+        is_raw ? WriteRaw(staged, radiance, light, take, index) : WriteExr(staged, radiance);
     if (!status) {
       return status;
     }
@@ -111,24 +164,26 @@ class SessionWriter {
       return tl::unexpected(sha256.error());
     }
     SessionFrame record{.role = light ? FrameRole::kLit : FrameRole::kDark,
-                        .light = light ? name : "",
+                        .light = light ? NameOf(light) : "",
                         .file = written,
                         .sha256 = *sha256};
     if (is_raw) {
-      record.exposure_s = file_.exposure.exposure_s;
+      record.exposure_s = take.exposure_s;
       record.f_number = file_.exposure.f_number;
       record.iso = file_.exposure.iso;
     }
-    exposure_ = record.Exposure();
     session_.frames.push_back(std::move(record));
     return {};
   }
 
   Status WriteRaw(const std::filesystem::path& path, const Image3& radiance,
-                  std::optional<size_t> light) {
-    const uint64_t stream = kSensorStream + (light ? *light : file_.scene.rig.lights.size());
+                  std::optional<size_t> light, const Take& take, size_t index) {
+    const uint64_t stream =
+        kSensorStream + kStreamsPerTake * index + (light ? *light : file_.scene.rig.lights.size());
+    Sensor sensor = file_.sensor;
+    sensor.full_scale *= file_.exposure.exposure_s / take.exposure_s;
     const Result<Image<uint16_t>> mosaic =
-        Expose(file_.sensor, radiance, HashOf(file_.scene.seed, stream), task_);
+        Expose(sensor, radiance, HashOf(file_.scene.seed, stream), task_);
     if (!mosaic) {
       return tl::unexpected(mosaic.error());
     }
@@ -138,7 +193,7 @@ class SessionWriter {
                      .white = file_.sensor.white_dn,
                      .make = "Sateen",
                      .model = file_.scene.rig.camera->model,
-                     .exposure_s = file_.exposure.exposure_s,
+                     .exposure_s = take.exposure_s,
                      .f_number = file_.exposure.f_number,
                      .iso = file_.exposure.iso});
   }
@@ -156,8 +211,14 @@ class SessionWriter {
   Status WriteRecord() {
     Rig rig = file_.scene.rig;
     if (format_ == FrameFormat::kRawDng) {
+      const double exposure = SessionFrame{.exposure_s = file_.exposure.exposure_s,
+                                           .f_number = file_.exposure.f_number,
+                                           .iso = file_.exposure.iso}
+                                  .Exposure();
       for (Light& light : rig.lights) {
-        light.flux_rgb /= file_.sensor.full_scale * exposure_;
+        light.flux_rgb =
+            light.flux_rgb.cwiseProduct(Eigen::Vector3d(file_.sensor.sensitivity_rgb.data())) /
+            (file_.sensor.full_scale * exposure);
       }
       Response response{.black = file_.sensor.black_dn, .white = file_.sensor.white_dn};
       if (file_.sensor.full_well_electrons) {
@@ -167,12 +228,28 @@ class SessionWriter {
       }
       rig.response = response;
     }
+    Rig true_rig = rig;
+    if (rig.response) {
+      true_rig.response->white = file_.sensor.saturation_dn.value_or(file_.sensor.white_dn);
+    }
+    if (file_.kind == SessionKind::kChart) {
+      rig.response.reset();  // which is what a chart is captured for
+    }
     const std::string rig_json = RigToJson(rig);
     session_.rig = "rig.json";
     session_.rig_sha256 = Sha256(rig_json);
     return folder_.WriteText("rig.json", rig_json)
-        .and_then([&] { return folder_.WriteText("truth/rig.json", rig_json); })
+        .and_then([&] { return folder_.WriteText("truth/rig.json", RigToJson(true_rig)); })
+        .and_then([&] { return WriteTruePose(); })
         .and_then([&] { return folder_.WriteText("session.json", SessionToJson(session_)); });
+  }
+
+  Status WriteTruePose() {
+    if (!file_.table_from_target) {
+      folder_.Retire(kTruePoseFile);
+      return {};
+    }
+    return folder_.WriteText(kTruePoseFile, TruePoseToJson(*file_.table_from_target));
   }
 
   const SceneFile& file_;
@@ -180,7 +257,6 @@ class SessionWriter {
   const Task& task_;
   OutputFolder& folder_;
   Session session_;
-  double exposure_ = 1.0;  // H of every frame
   std::vector<Rgb8> panels_;
   float white_ = 1.0F;
 };

@@ -1,6 +1,8 @@
 #include "cli/solve.h"
 
+#include <Eigen/Geometry>
 #include <chrono>
+#include <cmath>
 #include <filesystem>
 #include <ostream>
 #include <utility>
@@ -8,6 +10,7 @@
 #include "cli/maps.h"
 #include "cli/solve_report.h"
 #include "core/output_folder.h"
+#include "solver/undistort.h"
 
 namespace sateen::cli {
 namespace {
@@ -16,13 +19,6 @@ using Clock = std::chrono::steady_clock;
 
 double SecondsSince(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
-}
-
-Encoding EncodingNamed(const std::string& name) {
-  if (name == "linear") {
-    return Encoding::kLinear;
-  }
-  return name == "srgb" ? Encoding::kSrgb : Encoding::kAuto;
 }
 
 ReadCaptureOptions ReadOptionsOf(const SolveArgs& args) {
@@ -35,6 +31,25 @@ ReadCaptureOptions ReadOptionsOf(const SolveArgs& args) {
     options.mask_file = args.mask_file;
   }
   return options;
+}
+
+// From pixel to pixel on the table, in the middle of the picture. [mm]
+std::optional<double> PitchOnTable(const Rig& rig) {
+  if (!rig.camera) {
+    return std::nullopt;
+  }
+  const auto seen = [&](double right, double down) {
+    return TablePointOfPixel(*rig.camera, 0.5 * rig.camera->size_px.width + right,
+                             0.5 * rig.camera->size_px.height + down);
+  };
+  const std::optional<Eigen::Vector3d> middle = seen(0.0, 0.0);
+  const std::optional<Eigen::Vector3d> right = seen(1.0, 0.0);
+  const std::optional<Eigen::Vector3d> down = seen(0.0, 1.0);
+  if (!middle || !right || !down) {
+    return std::nullopt;
+  }
+  const double area = (*right - *middle).cross(*down - *middle).norm();
+  return area > 0.0 ? std::optional(std::sqrt(area)) : std::nullopt;
 }
 
 // Compares with truth where there is any; `error_map_deg` receives the angles.
@@ -53,6 +68,13 @@ Status Evaluate(SolveOutcome& outcome, std::optional<Image<float>>& error_map_de
   }
   outcome.angular_error_deg = *angle;
   error_map_deg = std::move(map);
+  if (const std::optional<double> pitch_mm = PitchOnTable(outcome.capture.rig)) {
+    const Result<ErrorStatistics> slow =
+        LowFrequencyErrorDeg(outcome.field, truth->normal, *pitch_mm);
+    if (slow && slow->count > 0) {
+      outcome.low_frequency_error_deg = *slow;
+    }
+  }
   if (truth->albedo) {
     const Result<ErrorStatistics> albedo = RelativeAlbedoError(outcome.field, *truth->albedo);
     if (!albedo) {
@@ -94,18 +116,63 @@ Status CheckSupported(const SolveArgs& args, Capture& capture) {
                 "or Normal_gt.mat",
                 args.capture.string());
   }
+  if (args.undistort && !capture.rig.camera) {
+    return Fail(ErrorCode::kBadData,
+                "{}: --undistort needs the lens, and the rig has no camera; run sateen calibrate "
+                "lens, or name a rig that has one with --rig",
+                args.capture.string());
+  }
   std::error_code ignored;  // a folder that does not exist yet is no other folder
   if (std::filesystem::equivalent(args.capture, args.output, ignored)) {
     return Fail(ErrorCode::kInvalidArgument,
                 "{}: is the capture itself; give a folder of its own for the maps",
                 args.output.string());
   }
-  if (capture.rig.response && capture.rig.response->white_balance != Eigen::Vector3d::Ones()) {
-    capture.warnings.push_back(
-        "the rig's response.white_balance is not applied: colours are those of the frames and the "
-        "lights' flux_rgb");
+  return {};
+}
+
+// What becomes maps; `outcome` stays in the camera's own pixels.
+struct MapsToWrite {
+  NormalField field;
+  LightFrame first_frame;  // in the overview
+  std::optional<Image<float>> error_deg;
+};
+
+// Takes the lens's distortion out of everything that becomes a map.
+Status UndistortMaps(const Camera& camera, const Task& task, MapsToWrite& maps) {
+  Result<NormalField> field = Undistorted(maps.field, camera, task);
+  if (!field) {
+    return tl::unexpected(field.error());
+  }
+  maps.field = *std::move(field);
+  std::vector<Image<float>*> planes;
+  for (Image<float>& plane : maps.first_frame.rgb.planes) {
+    planes.push_back(&plane);
+  }
+  if (maps.error_deg) {
+    planes.push_back(&*maps.error_deg);
+  }
+  for (Image<float>* plane : planes) {
+    Result<Image<float>> undistorted = Undistorted(*plane, camera, task);
+    if (!undistorted) {
+      return tl::unexpected(undistorted.error());
+    }
+    *plane = *std::move(undistorted);
   }
   return {};
+}
+
+Status StageAll(const SolveArgs& args, const SolveOutcome& outcome,
+                const std::optional<Image<float>>& error_deg, const Task& task,
+                OutputFolder& folder) {
+  const MapsOptions options{.normal_y_down = args.normal_y == "down"};
+  if (!args.undistort) {
+    return StageMaps(outcome.field, outcome.capture.stack.front(), error_deg, options, folder);
+  }
+  MapsToWrite maps{outcome.field, outcome.capture.stack.front(), error_deg};
+  return UndistortMaps(*outcome.capture.rig.camera, task, maps).and_then([&] {
+    return StageMaps(maps.field, maps.first_frame, maps.error_deg, options, folder);
+  });
 }
 
 // Reads, solves, compares and writes. Nothing is left behind where any of it fails.
@@ -144,8 +211,7 @@ Result<SolveOutcome> SolveCapture(const SolveArgs& args, const Task& task, std::
   std::optional<Image<float>> error_map_deg;
   Status status = Evaluate(outcome, error_map_deg);
   if (status) {
-    status = StageMaps(outcome.field, outcome.capture.stack.front(), error_map_deg,
-                       {.normal_y_down = args.normal_y == "down"}, *folder);
+    status = StageAll(args, outcome, error_map_deg, task, *folder);
   }
   if (status) {
     status = task.CheckCancelled();
@@ -165,6 +231,13 @@ Result<SolveOutcome> SolveCapture(const SolveArgs& args, const Task& task, std::
 
 }  // namespace
 
+Encoding EncodingNamed(const std::string& name) {
+  if (name == "linear") {
+    return Encoding::kLinear;
+  }
+  return name == "srgb" ? Encoding::kSrgb : Encoding::kAuto;
+}
+
 bool Passed(const SolveArgs& args, const SolveOutcome& outcome) {
   // Not "above", so that NaN does not pass.
   return !args.fail_above_deg || (outcome.angular_error_deg.has_value() &&
@@ -176,8 +249,8 @@ void AddSolve(CLI::App& root, SolveArgs& args) {
       root.add_subcommand("solve", "Solve surface normal and albedo for every pixel of a capture");
   cmd->add_option(
          "capture", args.capture,
-         "A session folder (session.json), a DiLiGenT folder, an RTI .lp file, or a folder "
-         "of images with a lights.txt in it or one folder up")
+         "A session folder (session.json), a DiLiGenT folder, an RTI .lp file, a folder of images "
+         "with a lights.txt in it or one folder up, or with --rig a folder of images alone")
       ->required();
   cmd->add_option("-o,--output", args.output, "Folder for the maps; made where missing")
       ->required();
@@ -212,6 +285,8 @@ void AddSolve(CLI::App& root, SolveArgs& args) {
                   "Normal maps with y up (OpenGL, glTF) or down (DirectX)")
       ->check(CLI::IsMember({"up", "down"}))
       ->capture_default_str();
+  cmd->add_flag("--undistort", args.undistort,
+                "Write the maps as a camera without the lens's distortion would have them");
   cmd->add_option("--encoding", args.encoding,
                   "What integer files hold; auto: 8 bits are sRGB, 16 bits are linear")
       ->check(CLI::IsMember({"auto", "linear", "srgb"}))

@@ -28,6 +28,7 @@ struct SolveArgs {
   int threads = 0;
   // Largest mean angular error from truth that passes, in (0, 180]; the capture must have truth.
   std::optional<double> fail_above_deg;
+  bool undistort = false;  // maps as the ideal pinhole camera would have them
   bool json = false;
 };
 
@@ -36,6 +37,7 @@ struct SolveOutcome {
   Capture capture;
   NormalField field;
   std::optional<ErrorStatistics> angular_error_deg;
+  std::optional<ErrorStatistics> low_frequency_error_deg;  // where the rig has a camera, too
   std::optional<ErrorStatistics> albedo_error;
   double seconds_reading = 0.0;
   double seconds_total = 0.0;
@@ -43,6 +45,9 @@ struct SolveOutcome {
 
 // Whether the mean angular error is within args.fail_above_deg; true where that is not given.
 [[nodiscard]] bool Passed(const SolveArgs& args, const SolveOutcome& outcome);
+
+// "linear", "srgb" or "auto".
+[[nodiscard]] Encoding EncodingNamed(const std::string& name);
 
 void AddSolve(CLI::App& root, SolveArgs& args);
 // Returns the program's exit status. Results go to `out`, warnings and errors to `log`.

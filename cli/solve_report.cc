@@ -22,6 +22,7 @@ nlohmann::json OptionsToJson(const SolveArgs& args) {
           {"dark_level", args.solver.dark_level},
           {"max_condition", args.solver.max_condition},
           {"normal_y", args.normal_y},
+          {"undistort", args.undistort},
           {"encoding", args.encoding}};
 }
 
@@ -80,8 +81,16 @@ std::string JsonReport(const SolveArgs& args, const SolveOutcome& outcome) {
     report["truth"] = outcome.capture.truth->source;
     report["angular_error_deg"] = ToJson(*outcome.angular_error_deg);
   }
+  if (outcome.low_frequency_error_deg) {
+    report["low_frequency_error_deg"] = ToJson(*outcome.low_frequency_error_deg);
+  }
   if (outcome.albedo_error) {
     report["albedo_error"] = ToJson(*outcome.albedo_error);
+  }
+  if (args.undistort) {
+    const Camera& camera = *outcome.capture.rig.camera;
+    report["map_camera"] = {{"k", {camera.fx, camera.fy, camera.cx, camera.cy}},
+                            {"distortion", {0, 0, 0, 0, 0}}};
   }
   if (args.fail_above_deg) {
     report["fail_above_deg"] = *args.fail_above_deg;
@@ -106,6 +115,11 @@ std::string TextReport(const SolveArgs& args, const SolveOutcome& outcome) {
     text += fmt::format(
         "angular error against {}: mean {:.4g}, median {:.4g}, p99 {:.4g}, max {:.4g} degrees\n",
         outcome.capture.truth->source, error.mean, error.median, error.p99, error.max);
+  }
+  if (outcome.low_frequency_error_deg) {
+    text +=
+        fmt::format("below 1 cycle per 50 mm: mean {:.4g}, max {:.4g} degrees\n",
+                    outcome.low_frequency_error_deg->mean, outcome.low_frequency_error_deg->max);
   }
   if (outcome.albedo_error) {
     text += fmt::format("albedo error: mean {:.3g} %, max {:.3g} %\n",

@@ -38,7 +38,7 @@ sateen_find_package(PkgConfig)
 sateen_find_pkg_config(LibRaw libraw_r)
 sateen_find_pkg_config(LibTiff libtiff-4>=4.5)
 sateen_find_pkg_config(matio matio)
-sateen_find_pkg_config(libserialport libserialport>=0.1.1)
+sateen_find_pkg_config(Cairo cairo-pdf>=1.16)
 # Not by its CMake package: Debian's stops unless the image viewer, and with it Qt, is installed.
 sateen_find_pkg_config(OpenImageIO OpenImageIO>=2.4)
 if(NOT TARGET OpenImageIO::OpenImageIO)
@@ -48,14 +48,4 @@ endif()
 # What the program uses and the libraries do not.
 if(NOT "${CMAKE_FIND_PACKAGE_NAME}" STREQUAL "sateen")
   find_package(CLI11 2.1 REQUIRED)
-endif()
-
-# For the virtual rig alone, because it is GPL-3. Not by pkg-config: Debian's file wants libelf-dev.
-if(SATEEN_BUILD_VIRTUAL_RIG AND NOT "${CMAKE_FIND_PACKAGE_NAME}" STREQUAL "sateen")
-  find_path(SATEEN_SIMAVR_INCLUDE_DIR simavr/sim_avr.h REQUIRED)
-  find_library(SATEEN_SIMAVR_LIBRARY simavr REQUIRED)
-  add_library(simavr::simavr UNKNOWN IMPORTED)
-  set_target_properties(simavr::simavr PROPERTIES
-    IMPORTED_LOCATION ${SATEEN_SIMAVR_LIBRARY}
-    INTERFACE_INCLUDE_DIRECTORIES ${SATEEN_SIMAVR_INCLUDE_DIR})
 endif()

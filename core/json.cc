@@ -119,19 +119,27 @@ std::optional<std::vector<double>> JsonReader::OptionalNumbers(std::string_view 
   return FindNumbers(key, count, false);
 }
 
-std::optional<std::vector<double>> JsonReader::FindNumbers(std::string_view key, size_t count,
+std::optional<std::vector<double>> JsonReader::OptionalNumberList(std::string_view key) {
+  return FindNumbers(key, std::nullopt, false);
+}
+
+std::optional<std::vector<double>> JsonReader::FindNumbers(std::string_view key,
+                                                           std::optional<size_t> count,
                                                            bool required) {
-  const std::string needed = fmt::format("an array of {} finite numbers", count);
+  const std::string needed = count ? fmt::format("an array of {} finite numbers", *count)
+                                   : "an array of finite numbers, at least one";
   const Json* value = Find(key, required, needed);
   if (value == nullptr) {
     return std::nullopt;
   }
-  if (!value->is_array() || value->size() != count) {
+  const bool is_long_enough =
+      value->is_array() && (count ? value->size() == *count : !value->empty());
+  if (!is_long_enough) {
     FailType(key, *value, needed);
     return std::nullopt;
   }
   std::vector<double> numbers;
-  numbers.reserve(count);
+  numbers.reserve(value->size());
   for (const Json& element : *value) {
     if (!IsFiniteNumber(element)) {
       FailType(fmt::format("{}[{}]", key, numbers.size()), element, "a finite number");

@@ -37,6 +37,8 @@ class JsonReader {
   std::optional<int> OptionalInteger(std::string_view key);
   std::optional<std::string> OptionalString(std::string_view key);
   std::optional<std::vector<double>> OptionalNumbers(std::string_view key, size_t count);
+  // An array of any length but 0.
+  std::optional<std::vector<double>> OptionalNumberList(std::string_view key);
   std::optional<JsonReader> OptionalObject(std::string_view key);
   // Accepts `key` whatever it holds.
   void Ignore(std::string_view key);
@@ -56,7 +58,9 @@ class JsonReader {
   std::optional<int> FindInteger(std::string_view key, bool required);
   std::optional<double> FindNumber(std::string_view key, bool required);
   std::optional<std::string> FindString(std::string_view key, bool required);
-  std::optional<std::vector<double>> FindNumbers(std::string_view key, size_t count, bool required);
+  // Of any length but 0 where `count` is nothing.
+  std::optional<std::vector<double>> FindNumbers(std::string_view key, std::optional<size_t> count,
+                                                 bool required);
   std::optional<JsonReader> FindObject(std::string_view key, bool required);
   void FailAt(std::string_view key, std::string_view problem);
   void FailType(std::string_view key, const nlohmann::json& found, std::string_view needed);

@@ -135,7 +135,7 @@ Status Camera::Validate(std::string_view what) const {
     return Fail(ErrorCode::kBadData, "{}.distortion: [{}]; need finite numbers", what,
                 fmt::join(distortion, ", "));
   }
-  return CheckPose(table_from_camera, what);
+  return has_pose ? CheckPose(table_from_camera, what) : Status();
 }
 
 Eigen::Vector2d PixelOfTablePoint(const Camera& camera, const Eigen::Vector3d& x_mm_in_table) {
@@ -166,6 +166,21 @@ std::optional<Eigen::Vector3d> TablePointOfPixel(const Camera& camera, double u,
   }
   const Eigen::Vector3d point = center + distance_mm * *ray;
   return Eigen::Vector3d(point.x(), point.y(), height_mm);
+}
+
+Camera PinholeOf(const Camera& camera) {
+  Camera pinhole = camera;
+  pinhole.distortion = {};
+  return pinhole;
+}
+
+std::optional<Eigen::Vector2d> PixelOfPinholePixel(const Camera& camera, double u, double v) {
+  const Eigen::Vector2d x((u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy);
+  const Distorted at = Distort(camera.distortion, x);
+  if (!IsInvertible(camera.distortion, x, at.jacobian)) {
+    return std::nullopt;
+  }
+  return Eigen::Vector2d(camera.fx * at.x.x() + camera.cx, camera.fy * at.x.y() + camera.cy);
 }
 
 Camera OverheadCamera(ImageSize size_px, double distance_mm, double width_mm) {

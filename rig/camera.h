@@ -26,6 +26,8 @@ struct Camera {
   std::array<double, 5> distortion = {};  // k1, k2, p1, p2, k3
   // Camera points (x right, y down, z forward) to table points, in millimetres.
   Eigen::Isometry3d table_from_camera = Eigen::Isometry3d::Identity();
+  // False between the calibrations of lens and pose: table_from_camera is not known.
+  bool has_pose = true;
 
   // Names the first field that is out of range, with its value and its range.
   [[nodiscard]] Status Validate(std::string_view what) const;
@@ -42,6 +44,14 @@ struct Camera {
 // Where that ray meets the plane z = height_mm. Nothing where it does not.
 [[nodiscard]] std::optional<Eigen::Vector3d> TablePointOfPixel(const Camera& camera, double u,
                                                                double v, double height_mm = 0.0);
+
+// The same camera without distortion: the ideal pinhole camera of --undistort.
+[[nodiscard]] Camera PinholeOf(const Camera& camera);
+
+// Where the camera's own picture shows what pixel (u, v) of PinholeOf(camera) shows: equations (2)
+// to (4). Nothing beyond the angle to which the distortion can be inverted.
+[[nodiscard]] std::optional<Eigen::Vector2d> PixelOfPinholePixel(const Camera& camera, double u,
+                                                                 double v);
 
 // A camera straight above the table's origin at `distance_mm`, x right and y up in the image, that
 // sees `width_mm` of the table across its width; no distortion.

@@ -26,6 +26,8 @@ std::string_view Name(LightModel model) {
       return "near";
     case LightModel::kLed:
       return "led";
+    case LightModel::kLedField:
+      return "led+field";
   }
   return "";
 }
@@ -40,13 +42,18 @@ Status Light::Validate(std::string_view what) const {
                 "{}: position_mm {}; need finite numbers and z > 0 (the table)", what,
                 Show(position_mm));
   }
-  if (model == LightModel::kLed && !IsUnit(axis)) {
+  if (IsLed(model) && !IsUnit(axis)) {
     return Fail(ErrorCode::kBadData, "{}: axis {} has length {:.6g}; need a unit vector", what,
                 Show(axis), axis.norm());
   }
-  if (model == LightModel::kLed && !(anisotropy >= 0.0 && anisotropy <= kMaxAnisotropy)) {
+  if (IsLed(model) && !(anisotropy >= 0.0 && anisotropy <= kMaxAnisotropy)) {
     return Fail(ErrorCode::kBadData, "{}: anisotropy {:.6g}; need 0 to {:g}", what, anisotropy,
                 kMaxAnisotropy);
+  }
+  if (model == LightModel::kLedField) {
+    if (Status status = field.Validate(fmt::format("{}: field", what)); !status) {
+      return status;
+    }
   }
   if (!(flux_rgb.allFinite() && flux_rgb.minCoeff() > 0.0)) {
     return Fail(ErrorCode::kBadData, "{}: intensity {}; need three finite numbers > 0", what,
@@ -63,9 +70,12 @@ Incident IncidentAt(const Light& light, const Eigen::Vector3d& x_mm) {
   const double distance_mm = d.norm();
   const double falloff = kReferenceDistanceMm / distance_mm;
   Incident incident{d / distance_mm, light.flux_rgb * (falloff * falloff)};  // (2)
-  if (light.model == LightModel::kLed) {
+  if (IsLed(light.model)) {
     const double cosine = -incident.l.dot(light.axis);
     incident.e_rgb *= cosine > 0.0 ? std::pow(cosine, light.anisotropy) : 0.0;  // (3)
+  }
+  if (light.model == LightModel::kLedField) {
+    incident.e_rgb *= light.field.At(ShadowOnTable(light.position_mm, x_mm));  // (4)
   }
   return incident;
 }

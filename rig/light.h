@@ -6,13 +6,16 @@
 #include <vector>
 
 #include "core/error.h"
+#include "rig/gain_field.h"
 
 namespace sateen {
 
 // The rungs of the model ladder (docs/concepts.md); each adds to the one above.
-enum class LightModel { kDistant, kNear, kLed };
+enum class LightModel { kDistant, kNear, kLed, kLedField };
 
 [[nodiscard]] std::string_view Name(LightModel model);
+// Has an axis and a fall-off.
+[[nodiscard]] constexpr bool IsLed(LightModel model) { return model >= LightModel::kLed; }
 
 // One LED as a plain value, in the table frame. Which fields count depends on `model`.
 struct Light {
@@ -21,11 +24,13 @@ struct Light {
   LightModel model = LightModel::kDistant;
   // kDistant: unit vector from the table towards the light.
   Eigen::Vector3d direction = Eigen::Vector3d::UnitZ();
-  // kNear, kLed: where the light is.
+  // kNear and above: where the light is.
   Eigen::Vector3d position_mm = Eigen::Vector3d::Zero();
-  // kLed: unit vector along which it shines, and the exponent mu, 0 to 50, of its angular fall-off.
+  // kLed and above: unit vector along which it shines, and the exponent mu, 0 to 50, of its angular fall-off.
   Eigen::Vector3d axis = -Eigen::Vector3d::UnitZ();
   double anisotropy = 0.0;
+  // kLedField: what the led's law is multiplied by, over the table.
+  GainField field;
   // kDistant: irradiance; otherwise the irradiance at 1 m on the axis. Red, green, blue; > 0.
   Eigen::Vector3d flux_rgb = Eigen::Vector3d::Ones();
 
@@ -47,8 +52,9 @@ struct Incident {
 ///     distant   l constant,                e = phi                                        (1)
 ///     near      d = s - x, l = d / |d|,    e = phi (1000 mm / |d|)^2                      (2)
 ///     led       as near, and               e = (2) * (-l . a)^mu, 0 where -l . a <= 0     (3)
+///     led+field as led, and                e = (3) * g(x'), x' = ShadowOnTable(s, x)      (4)
 ///
-/// s = position_mm, a = axis, mu = anisotropy, phi = flux_rgb. x must not be s.
+/// s = position_mm, a = axis, mu = anisotropy, phi = flux_rgb, g = field. x must not be s.
 [[nodiscard]] Incident IncidentAt(const Light& light, const Eigen::Vector3d& x_mm);
 
 }  // namespace sateen

@@ -6,6 +6,7 @@
 #include <set>
 
 #include "core/json.h"
+#include "rig/light_json.h"
 
 namespace sateen {
 namespace {
@@ -15,14 +16,6 @@ using Json = nlohmann::json;
 // Below this a vector or rotation is exact but for rounding and stays as it is, so that reading
 // what was written changes no bit.
 constexpr double kRounding = 1e-14;
-
-Eigen::Vector3d Vector3(const std::vector<double>& numbers) {
-  return Eigen::Map<const Eigen::Vector3d>(numbers.data());
-}
-
-Eigen::Vector3d Unit(const Eigen::Vector3d& v) {
-  return std::abs(v.norm() - 1.0) > kRounding ? v.normalized() : v;
-}
 
 // The rotation nearest to one that a file has rounded.
 Eigen::Matrix3d NearestRotation(const Eigen::Matrix3d& r) {
@@ -43,7 +36,7 @@ Result<Camera> ReadCamera(JsonReader reader, const std::string& what) {
   }
   const std::vector<double> k = reader.Numbers("k", 4);
   const std::vector<double> distortion = reader.Numbers("distortion", 5);
-  const std::vector<double> pose = reader.Numbers("table_from_camera", 16);
+  const std::optional<std::vector<double>> pose = reader.OptionalNumbers("table_from_camera", 16);
   if (Status status = reader.Finish(); !status) {
     return tl::unexpected(status.error());
   }
@@ -53,8 +46,11 @@ Result<Camera> ReadCamera(JsonReader reader, const std::string& what) {
   camera.cx = k[2];
   camera.cy = k[3];
   std::copy(distortion.begin(), distortion.end(), camera.distortion.begin());
-  camera.table_from_camera.matrix() =
-      Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(pose.data());
+  camera.has_pose = pose.has_value();
+  if (pose) {
+    camera.table_from_camera.matrix() =
+        Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(pose->data());
+  }
   if (Status status = camera.Validate(what); !status) {
     return tl::unexpected(status.error());
   }
@@ -75,69 +71,19 @@ Result<Response> ReadResponse(JsonReader reader) {
   return response;
 }
 
-LightModel ReadModel(JsonReader& reader) {
-  const std::string name = reader.String("model");
-  for (const LightModel model : {LightModel::kDistant, LightModel::kNear, LightModel::kLed}) {
-    if (name == Name(model)) {
-      return model;
-    }
-  }
-  reader.Require(false, "model",
-                 fmt::format("is \"{}\"; need \"distant\", \"near\" or \"led\"", name));
-  return LightModel::kDistant;
-}
-
-// Frames are named after their lights.
-bool IsFileName(const std::string& name) {
-  return !name.empty() && name != "." && name != ".." &&
-         std::none_of(name.begin(), name.end(),
-                      [](unsigned char c) { return c == '/' || c < 0x20 || c == 0x7f; });
-}
-
-Result<Light> ReadLight(JsonReader reader, const std::string& what) {
-  Light light;
-  light.name = reader.String("name");
-  reader.Require(IsFileName(light.name), "name",
-                 fmt::format("is \"{}\"; need a name that a frame's file can have, without / and "
-                             "control characters",
-                             light.name));
-  light.channel = reader.Integer("channel");
-  light.model = ReadModel(reader);
-  reader.Require(!reader.Has("field"), "field",
-                 "is of the rung \"led + field\", which this version cannot use; calibrate the "
-                 "lights with this version, or use the version that wrote the file");
-  if (light.model == LightModel::kDistant) {
-    light.direction = Vector3(reader.Numbers("direction", 3));
-    reader.Require(light.direction.z() > 0.0, "direction",
-                   fmt::format("has z = {}; need z > 0, above the table", light.direction.z()));
-  } else {
-    light.position_mm = Vector3(reader.Numbers("position_mm", 3));
-  }
-  if (light.model == LightModel::kLed) {
-    light.axis = Vector3(reader.Numbers("axis", 3));
-    light.anisotropy = reader.Number("anisotropy");
-  }
-  light.flux_rgb = Vector3(reader.Numbers("flux_rgb", 3));
-  if (Status status = reader.Finish().and_then([&] { return light.Validate(what); }); !status) {
-    return tl::unexpected(status.error());
-  }
-  light.direction = Unit(light.direction);
-  light.axis = Unit(light.axis);
-  return light;
-}
-
-Json ToJson(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
-
-nlohmann::ordered_json ToJson(const Camera& camera) {
+nlohmann::ordered_json CameraToJson(const Camera& camera) {
   const Eigen::Matrix<double, 4, 4, Eigen::RowMajor> pose = camera.table_from_camera.matrix();
-  return {{"model", camera.model},
-          {"size_px", {camera.size_px.width, camera.size_px.height}},
-          {"k", {camera.fx, camera.fy, camera.cx, camera.cy}},
-          {"distortion", camera.distortion},
-          {"table_from_camera", std::vector<double>(pose.data(), pose.data() + pose.size())}};
+  nlohmann::ordered_json json = {{"model", camera.model},
+                                 {"size_px", {camera.size_px.width, camera.size_px.height}},
+                                 {"k", {camera.fx, camera.fy, camera.cx, camera.cy}},
+                                 {"distortion", camera.distortion}};
+  if (camera.has_pose) {
+    json["table_from_camera"] = std::vector<double>(pose.data(), pose.data() + pose.size());
+  }
+  return json;
 }
 
-nlohmann::ordered_json ToJson(const Response& response) {
+nlohmann::ordered_json ResponseToJson(const Response& response) {
   nlohmann::ordered_json json = {{"black", response.black},
                                  {"white", response.white},
                                  {"white_balance", ToJson(response.white_balance)}};
@@ -147,22 +93,6 @@ nlohmann::ordered_json ToJson(const Response& response) {
   if (response.gain_dn_per_electron) {
     json["gain_dn_per_electron"] = *response.gain_dn_per_electron;
   }
-  return json;
-}
-
-nlohmann::ordered_json ToJson(const Light& light) {
-  nlohmann::ordered_json json = {
-      {"name", light.name}, {"channel", light.channel}, {"model", Name(light.model)}};
-  if (light.model == LightModel::kDistant) {
-    json["direction"] = ToJson(light.direction);
-  } else {
-    json["position_mm"] = ToJson(light.position_mm);
-  }
-  if (light.model == LightModel::kLed) {
-    json["axis"] = ToJson(light.axis);
-    json["anisotropy"] = light.anisotropy;
-  }
-  json["flux_rgb"] = ToJson(light.flux_rgb);
   return json;
 }
 
@@ -199,9 +129,11 @@ std::string WhatLight(std::string_view what, size_t k) {
   return fmt::format("{}: lights[{}]", what, k);
 }
 
-Status CheckLights(const Lights& lights, bool has_camera, std::string_view what) {
-  if (lights.empty()) {
-    return Fail(ErrorCode::kBadData, "{}: lights is empty; need at least one light", what);
+Status CheckLights(const Lights& lights, const std::optional<Camera>& camera,
+                   std::string_view what) {
+  if (lights.empty() && !camera) {
+    return Fail(ErrorCode::kBadData, "{}: lights is empty; need at least one light, or a camera",
+                what);
   }
   std::set<std::string_view> names;
   for (size_t k = 0; k < lights.size(); ++k) {
@@ -217,7 +149,13 @@ Status CheckLights(const Lights& lights, bool has_camera, std::string_view what)
       return Fail(ErrorCode::kBadData, "{}: the name \"{}\" is taken; give each light its own",
                   WhatLight(what, k), light.name);
     }
-    if (light.model != LightModel::kDistant && !has_camera) {
+    if (light.model != LightModel::kDistant && camera && !camera->has_pose) {
+      return Fail(ErrorCode::kBadData,
+                  "{}: camera has no table_from_camera, but lights[{}] is \"{}\": no pixel has a "
+                  "place on the table; run sateen calibrate pose first, then add near lights",
+                  what, k, Name(light.model));
+    }
+    if (light.model != LightModel::kDistant && !camera) {
       return Fail(
           ErrorCode::kBadData,
           "{}: camera is missing, but lights[{}] is \"{}\": without a camera no pixel has a "
@@ -242,7 +180,34 @@ Status Rig::Validate(std::string_view what) const {
       !Json::parse(calibration_json, nullptr, /*allow_exceptions=*/false).is_object()) {
     return Fail(ErrorCode::kBadData, "{}: calibration is not a JSON object; need one", what);
   }
-  return status.and_then([&] { return CheckLights(lights, camera.has_value(), what); });
+  return status.and_then([&] { return CheckLights(lights, camera, what); });
+}
+
+Status Rig::RequirePose(std::string_view what) const {
+  if (!camera) {
+    return Fail(ErrorCode::kBadData,
+                "{}: the rig has no camera, so that no pixel has a place on the table; run sateen "
+                "calibrate lens, then sateen calibrate pose",
+                what);
+  }
+  if (!camera->has_pose) {
+    return Fail(ErrorCode::kBadData,
+                "{}: the rig's camera has a lens but no pose yet, so that no pixel has a place on "
+                "the table; run sateen calibrate pose",
+                what);
+  }
+  return {};
+}
+
+Eigen::Vector3d WhiteBalanceOf(const Rig& rig) {
+  return rig.response ? rig.response->white_balance : Eigen::Vector3d::Ones();
+}
+
+Lights Rebalanced(Lights lights, const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
+  for (Light& light : lights) {
+    light.flux_rgb = light.flux_rgb.cwiseProduct(to).cwiseQuotient(from);
+  }
+  return lights;
 }
 
 Result<Rig> ReadRig(const std::filesystem::path& path) {
@@ -286,16 +251,18 @@ Result<Rig> ReadRig(const std::filesystem::path& path) {
 std::string RigToJson(const Rig& rig) {
   std::vector<std::string> members = {R"(  "schema": "sateen.rig/1")"};
   if (rig.camera) {
-    members.push_back("  \"camera\": " + Line(ToJson(*rig.camera)));
+    members.push_back("  \"camera\": " + Line(CameraToJson(*rig.camera)));
   }
   if (rig.response) {
-    members.push_back("  \"response\": " + Line(ToJson(*rig.response)));
+    members.push_back("  \"response\": " + Line(ResponseToJson(*rig.response)));
   }
   std::vector<std::string> lights;
   for (const Light& light : rig.lights) {
     lights.push_back("    " + Line(ToJson(light)));
   }
-  members.push_back(fmt::format("  \"lights\": [\n{}\n  ]", fmt::join(lights, ",\n")));
+  members.push_back(lights.empty()
+                        ? R"(  "lights": [])"
+                        : fmt::format("  \"lights\": [\n{}\n  ]", fmt::join(lights, ",\n")));
   if (!rig.calibration_json.empty()) {
     members.push_back("  \"calibration\": " + rig.calibration_json);
   }

@@ -6,11 +6,12 @@
 #include "imaging/image_io.h"
 #include "imaging/raw.h"
 #include "scanner/frame_loader.h"
+#include "scanner/sensor_reading.h"
 
 namespace sateen {
 namespace {
 
-constexpr float kSaturationLevel = 0.98F;  // of the white level
+constexpr float kSaturationLevel = 0.98F;  // of what saturates
 constexpr int kFewestSites = 4;            // along each side of a block
 
 // What one block adds up, for each colour.
@@ -54,32 +55,35 @@ Span SpanOf(int block, int blocks, int sites) {
           static_cast<int>(static_cast<int64_t>(block + 1) * sites / blocks)};
 }
 
-BlockMean MeanOfMosaic(const RawMosaic& mosaic, Span columns, Span rows, double exposure) {
+BlockMean MeanOfMosaic(const RawMosaic& mosaic, const SensorReading& reading, Span columns,
+                       Span rows, double exposure) {
   BlockSums sums;
   for (int y = rows.begin; y < rows.end; ++y) {
     for (int x = columns.begin; x < columns.end; ++x) {
       const size_t colour = mosaic.cfa[static_cast<size_t>(y % 2 * 2 + x % 2)];
-      const float value = mosaic.samples.At(x, y);
-      sums.Add(colour, value, kSaturationLevel);
+      const float value = reading.Value(mosaic.samples.At(x, y), colour);
+      sums.Add(colour, value, kSaturationLevel * reading.Value(reading.saturation, colour));
       if (x + 2 < columns.end) {
-        sums.AddPair(colour, value, mosaic.samples.At(x + 2, y));
+        sums.AddPair(colour, value, reading.Value(mosaic.samples.At(x + 2, y), colour));
       }
     }
   }
   return sums.Mean(exposure);
 }
 
-BlockMean MeanOfPhoto(const Photo& photo, Span columns, Span rows, double exposure) {
-  const float saturation = photo.saturation ? kSaturationLevel * *photo.saturation
-                                            : std::numeric_limits<float>::infinity();
+BlockMean MeanOfPhoto(const Photo& photo, const SensorReading& reading, Span columns, Span rows,
+                      double exposure) {
   BlockSums sums;
   for (size_t c = 0; c < 3; ++c) {
+    const float saturation = photo.saturation
+                                 ? kSaturationLevel * reading.Value(*photo.saturation, c)
+                                 : std::numeric_limits<float>::infinity();
     for (int y = rows.begin; y < rows.end; ++y) {
       for (int x = columns.begin; x < columns.end; ++x) {
-        const float value = photo.rgb[c].At(x, y);
+        const float value = reading.Value(photo.rgb[c].At(x, y), c);
         sums.Add(c, value, saturation);
         if (x + 1 < columns.end) {
-          sums.AddPair(c, value, photo.rgb[c].At(x + 1, y));
+          sums.AddPair(c, value, reading.Value(photo.rgb[c].At(x + 1, y), c));
         }
       }
     }
@@ -108,10 +112,14 @@ Result<BlockMeans> Divide(const FrameFile& file, ImageSize size_px, const BlockG
 
 }  // namespace
 
-Eigen::Vector2d BlockMeans::Center(int column, int row) const {
+Eigen::AlignedBox2d BlockMeans::Extent(int column, int row) const {
   const Span x = SpanOf(column, grid.columns, size_px.width);
   const Span y = SpanOf(row, grid.rows, size_px.height);
-  return {0.5 * (x.begin + x.end - 1), 0.5 * (y.begin + y.end - 1)};
+  return {Eigen::Vector2d(x.begin, y.begin), Eigen::Vector2d(x.end - 1, y.end - 1)};
+}
+
+Eigen::Vector2d BlockMeans::Center(int column, int row) const {
+  return Extent(column, row).center();
 }
 
 Result<BlockMeans> ReadBlockMeans(const FrameFile& file, const BlockGrid& grid) {
@@ -122,14 +130,16 @@ Result<BlockMeans> ReadBlockMeans(const FrameFile& file, const BlockGrid& grid) 
   Result<BlockMeans> means = BlockMeans();
   if (IsRawName(file.path)) {
     means = ReadRawMosaic(file.path).and_then([&](const RawMosaic& mosaic) {
-      return Divide(file, mosaic.samples.Size(), grid, [&](Span columns, Span rows) {
-        return MeanOfMosaic(mosaic, columns, rows, file.exposure);
+      return ReadingOf(file, mosaic).and_then([&](const SensorReading& reading) {
+        return Divide(file, mosaic.samples.Size(), grid, [&](Span columns, Span rows) {
+          return MeanOfMosaic(mosaic, reading, columns, rows, file.exposure);
+        });
       });
     });
   } else {
     means = ReadPhoto(file.path, Encoding::kAuto).and_then([&](const Photo& photo) {
       return Divide(file, photo.rgb.Size(), grid, [&](Span columns, Span rows) {
-        return MeanOfPhoto(photo, columns, rows, file.exposure);
+        return MeanOfPhoto(photo, ReadingOf(file), columns, rows, file.exposure);
       });
     });
   }

@@ -1,6 +1,6 @@
 #pragma once
 
-#include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <vector>
 
 #include "core/error.h"
@@ -19,7 +19,7 @@ struct BlockMean {
   // Of one site, from how neighbours of one colour differ: a slope across the block is no noise.
   Eigen::Vector3d site_variance_rgb = Eigen::Vector3d::Zero();
   Eigen::Vector3d sites_rgb = Eigen::Vector3d::Zero();  // how many sites of each colour
-  bool saturated = false;  // a site at or above 98 % of the white level
+  bool saturated = false;                               // a site at or above 98 % of what saturates
 };
 
 // A frame as the means of its blocks, rows from the top: what a fit of smooth light needs of it.
@@ -29,8 +29,9 @@ struct BlockMeans {
   std::vector<BlockMean> blocks;
   std::string sha256;
 
-  // The middle of a block. [px]
+  // The middle of a block, and its outermost pixels. [px]
   [[nodiscard]] Eigen::Vector2d Center(int column, int row) const;
+  [[nodiscard]] Eigen::AlignedBox2d Extent(int column, int row) const;
 };
 
 /// Reads a frame of a session: camera RAW straight from the mosaic, each colour from its own sites, or

@@ -18,6 +18,8 @@ struct FrameFile {
   // The file's value divided by this is radiance: exposure_s (iso / 100) / f_number^2.
   double exposure = 1.0;
   std::optional<std::string> sha256;  // what the session recorded
+  // Of the rig that the frame is read for: how its readings become balanced radiance.
+  std::optional<Response> response = std::nullopt;
 };
 
 // What a layout says about a capture, before any pixel is read.

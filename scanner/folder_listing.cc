@@ -94,6 +94,11 @@ bool IsMaskName(std::string_view name) {
          (stem == "mask" || stem.ends_with("_mask") || lower.find(".mask.") != std::string::npos);
 }
 
+bool IsReferenceName(std::string_view name) {
+  const std::string stem = fs::path(LowerCase(name)).stem().string();
+  return stem == "ref" || stem == "reference";
+}
+
 Result<std::optional<fs::path>> FindMask(const fs::path& dir) {
   const Result<std::vector<std::string>> names = FilesInNaturalOrder(dir);
   if (!names) {

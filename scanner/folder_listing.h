@@ -20,6 +20,9 @@ namespace sateen {
 // mask.png, cat.mask.tga, cat_mask.png: photographs by their ending, masks by their name.
 [[nodiscard]] bool IsMaskName(std::string_view name);
 
+// ref.jpg, reference.png: a picture by room light beside the photographs.
+[[nodiscard]] bool IsReferenceName(std::string_view name);
+
 // The one mask in `dir`; kBadData where several could be meant.
 [[nodiscard]] Result<std::optional<std::filesystem::path>> FindMask(
     const std::filesystem::path& dir);

@@ -5,12 +5,12 @@
 #include "core/parallel.h"
 #include "core/sha256.h"
 #include "imaging/raw.h"
+#include "scanner/sensor_reading.h"
 
 namespace sateen {
 namespace {
 
-constexpr float kWhite = 1.0F;  // the white level in a RawMosaic
-constexpr float kSaturatedSite = 8.0F;
+constexpr float kSaturatedSite = 8.0F;  // times the reading at which the last channel saturates
 
 struct LoadedFrame {
   LightFrame frame;
@@ -18,17 +18,40 @@ struct LoadedFrame {
   std::string sha256;
 };
 
+// In their own channel, saturated samples of a balanced photo are put at its full scale.
+void Balance(const SensorReading& reading, Photo& photo) {
+  const float top = photo.saturation ? *photo.saturation * reading.Largest() : 0.0F;
+  for (size_t c = 0; c < 3; ++c) {
+    for (float& value : photo.rgb[c].pixels) {
+      value = photo.saturation && value >= *photo.saturation ? top : reading.Value(value, c);
+    }
+  }
+  if (photo.saturation) {
+    photo.saturation = top;
+  }
+}
+
 Result<Photo> ReadPhotoOrRaw(const FrameFile& file, Encoding encoding) {
   if (!IsRawName(file.path)) {
-    return ReadPhoto(file.path, encoding);
+    return ReadPhoto(file.path, encoding).map([&](Photo photo) {
+      Balance(ReadingOf(file), photo);
+      return photo;
+    });
   }
-  return ReadRawMosaic(file.path).map([](RawMosaic mosaic) {
-    // A saturated site must not pass as a mean of it and its neighbours: whatever pixel it has a
-    // part in, at least a quarter, comes out above the white level.
-    for (float& site : mosaic.samples.pixels) {
-      site = site >= kWhite ? kSaturatedSite : site;
-    }
-    return Photo{Demosaic(mosaic), kWhite, false};
+  return ReadRawMosaic(file.path).and_then([&](RawMosaic mosaic) {
+    return ReadingOf(file, mosaic).map([&](const SensorReading& reading) {
+      // A saturated site must not pass as a mean of it and its neighbours: whatever pixel it has a
+      // part in, at least a quarter, comes out above the level of saturation.
+      const float top = reading.FullScale();
+      for (int y = 0; y < mosaic.samples.height; ++y) {
+        for (int x = 0; x < mosaic.samples.width; ++x) {
+          float& site = mosaic.samples.At(x, y);
+          const size_t colour = mosaic.cfa[static_cast<size_t>(y % 2 * 2 + x % 2)];
+          site = site >= reading.saturation ? kSaturatedSite * top : reading.Value(site, colour);
+        }
+      }
+      return Photo{Demosaic(mosaic), top, false};
+    });
   });
 }
 

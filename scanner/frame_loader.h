@@ -23,7 +23,7 @@ struct LoadedFrames {
 ///
 ///     i_k = v_k / H_k - mean_d(v_d / H_d),    full_scale_k = saturation_k / H_k            (1)
 ///
-/// v is the file's value, H its exposure. A sample that is saturated before the subtraction stays
+/// v is the file's value, balanced by the rig's response (scanner/sensor_reading.h), H its exposure. A sample that is saturated before the subtraction stays
 /// at full_scale, so that a bright dark frame cannot hide that it is. At least one lit frame.
 ///
 /// Errors   kIo: a file is absent or unreadable

@@ -134,6 +134,33 @@ Result<CapturePlan> PlanLightsFolder(const fs::path& dir, const fs::path& lights
   return plan;
 }
 
+Result<CapturePlan> PlanPhotographs(const fs::path& dir) {
+  CapturePlan plan;
+  plan.layout = "photographs";
+  Result<std::vector<std::string>> names = FilesInNaturalOrder(dir);
+  if (!names) {
+    return tl::unexpected(names.error());
+  }
+  std::erase_if(*names, IsReferenceName);
+  for (const std::string& image : SelectImages(*names, plan)) {
+    plan.lit.emplace_back(FrameFile{dir / image, 1.0, std::nullopt});
+    Light light;
+    light.name = fs::path(image).stem().string();
+    plan.rig.lights.push_back(light);
+  }
+  if (plan.lit.empty()) {
+    return Fail(ErrorCode::kBadData,
+                "{}: found {}, no photograph among them; need one for each light", dir.string(),
+                DescribeFolder(dir));
+  }
+  const Result<std::optional<fs::path>> mask = FindMask(dir);
+  if (!mask) {
+    return tl::unexpected(mask.error());
+  }
+  plan.mask = *mask;
+  return plan;
+}
+
 Status FindCompanions(const fs::path& dir, const fs::path& shared_dir, bool find_mask,
                       CapturePlan& plan) {
   plan.truth = FindPublicTruth(dir);

@@ -17,6 +17,11 @@ namespace sateen {
 [[nodiscard]] Result<CapturePlan> PlanLightsFolder(const std::filesystem::path& dir,
                                                    const std::filesystem::path& lights_file);
 
+// A folder of photographs in natural order, one for each light, whose lights are told or found
+// elsewhere: until then they are named after the files and shine from straight above. The folder's
+// own mask counts; a reference picture (IsReferenceName) is no frame.
+[[nodiscard]] Result<CapturePlan> PlanPhotographs(const std::filesystem::path& dir);
+
 // Adds to `plan` the mask (unless `find_mask` is false) and the truth that lie in `dir`; else the
 // mask.* one folder up, and the truth in `shared_dir`: data sets of several folders keep one.
 [[nodiscard]] Status FindCompanions(const std::filesystem::path& dir,

@@ -7,13 +7,13 @@
 
 #include "core/json.h"
 #include "scanner/folder_listing.h"
+#include "scanner/pose_json.h"
 
 namespace sateen {
 namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kRigidTolerance = 1e-6;  // of a rotation written with nine digits or more
 constexpr std::array kKinds = {SessionKind::kFabric, SessionKind::kSheet, SessionKind::kChart,
                                SessionKind::kBoard};
 constexpr std::array kRoles = {FrameRole::kLit, FrameRole::kDark};
@@ -69,22 +69,6 @@ SessionFrame ReadFrame(JsonReader& json) {
   frame.f_number = ReadFactor(json, "f_number", 1000.0);
   frame.iso = ReadFactor(json, "iso", 1e7);
   return frame;
-}
-
-std::optional<Eigen::Isometry3d> ReadTransform(JsonReader& json, std::string_view key) {
-  const std::optional<std::vector<double>> numbers = json.OptionalNumbers(key, 16);
-  if (!numbers) {
-    return std::nullopt;
-  }
-  const Eigen::Matrix4d matrix =
-      Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(numbers->data());
-  const Eigen::Matrix3d rotation = matrix.topLeftCorner<3, 3>();
-  const bool is_rigid =
-      (rotation * rotation.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() <=
-          kRigidTolerance &&
-      rotation.determinant() > 0.0 && matrix.row(3) == Eigen::RowVector4d(0, 0, 0, 1);
-  json.Require(is_rigid, key, "is no rigid motion; need a rotation, a shift and 0 0 0 1, by rows");
-  return Eigen::Isometry3d(matrix);
 }
 
 // With a factor known for some frames only, the others would come out in another unit.
@@ -205,8 +189,7 @@ std::string SessionToJson(const Session& session) {
     json["frames"].push_back(FrameToJson(frame));
   }
   if (session.table_from_sheet) {
-    const Eigen::Matrix<double, 4, 4, Eigen::RowMajor> matrix = session.table_from_sheet->matrix();
-    json["table_from_sheet"] = std::vector<double>(matrix.data(), matrix.data() + matrix.size());
+    json["table_from_sheet"] = RowMajor(*session.table_from_sheet);
   }
   PutIfKnown(json, "mask", session.mask);
   // A file name that is not UTF-8 must not end the run; reading will say that it is not there.

@@ -43,7 +43,7 @@ Status AssignFrames(const fs::path& dir, CapturePlan& plan) {
   const std::string where = (dir / "session.json").string();
   plan.lit.resize(plan.rig.lights.size());
   for (const SessionFrame& frame : plan.session->frames) {
-    FrameFile file{dir / frame.file, frame.Exposure(), frame.sha256};
+    FrameFile file{dir / frame.file, frame.Exposure(), frame.sha256, plan.rig.response};
     if (frame.role == FrameRole::kDark) {
       plan.dark.push_back(std::move(file));
       continue;
@@ -54,13 +54,17 @@ Status AssignFrames(const fs::path& dir, CapturePlan& plan) {
     if (light == lights.end()) {
       return Fail(ErrorCode::kBadData,
                   "{}: frame {} is of light '{}', which the rig has not; its lights are {}", where,
-                  frame.file, frame.light, NamesOf(lights));
+                  frame.file, frame.light,
+                  lights.empty() ? "none: give it rough positions by the ruler" : NamesOf(lights));
     }
     std::optional<FrameFile>& slot = plan.lit[static_cast<size_t>(light - lights.begin())];
     if (slot) {
       return Fail(ErrorCode::kBadData,
-                  "{}: frames {} and {} are both of light '{}'; need one frame for each light",
-                  where, slot->path.lexically_relative(dir).string(), frame.file, frame.light);
+                  "{}: frames {} and {} are both of light '{}'; need one frame for each light{}",
+                  where, slot->path.lexically_relative(dir).string(), frame.file, frame.light,
+                  plan.session->kind == SessionKind::kChart
+                      ? "; the series of a chart is for sateen calibrate response"
+                      : "");
     }
     slot = std::move(file);
   }
@@ -69,7 +73,7 @@ Status AssignFrames(const fs::path& dir, CapturePlan& plan) {
 
 }  // namespace
 
-Result<CapturePlan> PlanSession(const fs::path& dir, const ReadCaptureOptions& options) {
+Result<CapturePlan> PlanSessionRig(const fs::path& dir, const ReadCaptureOptions& options) {
   CapturePlan plan;
   plan.layout = "session";
   const Result<Session> session = ReadSession(dir);
@@ -88,13 +92,21 @@ Result<CapturePlan> PlanSession(const fs::path& dir, const ReadCaptureOptions& o
   if (!rig) {
     return tl::unexpected(rig.error());
   }
-  if (const Status status = AssignFrames(dir, plan); !status) {
+  return plan;
+}
+
+Result<CapturePlan> PlanSession(const fs::path& dir, const ReadCaptureOptions& options) {
+  Result<CapturePlan> plan = PlanSessionRig(dir, options);
+  if (!plan) {
+    return plan;
+  }
+  if (const Status status = AssignFrames(dir, *plan); !status) {
     return tl::unexpected(status.error());
   }
-  if (session->mask) {
-    plan.mask = dir / *session->mask;
+  if (plan->session->mask) {
+    plan->mask = dir / *plan->session->mask;
   }
-  plan.truth = FindSessionTruth(dir);
+  plan->truth = FindSessionTruth(dir);
   return plan;
 }
 

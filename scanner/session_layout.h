@@ -13,4 +13,8 @@ namespace sateen {
 [[nodiscard]] Result<CapturePlan> PlanSession(const std::filesystem::path& dir,
                                               const ReadCaptureOptions& options);
 
+// The record and the rig of it alone, no frames: for sessions that may have several of a light.
+[[nodiscard]] Result<CapturePlan> PlanSessionRig(const std::filesystem::path& dir,
+                                                 const ReadCaptureOptions& options);
+
 }  // namespace sateen

@@ -49,6 +49,9 @@ Result<CapturePlan> PlanByPath(const fs::path& path, const ReadCaptureOptions& o
   if (Exists(path / "session.json") || Exists(path / "journal.jsonl")) {
     return PlanSession(path, options);
   }
+  if (options.lights_unknown) {
+    return PlanPhotographs(path);
+  }
   if (Exists(path / "light_directions.txt")) {
     return PlanDiligent(path).and_then(with_companions(path, path));
   }
@@ -57,10 +60,15 @@ Result<CapturePlan> PlanByPath(const fs::path& path, const ReadCaptureOptions& o
       return PlanLightsFolder(path, dir / "lights.txt").and_then(with_companions(path, dir));
     }
   }
-  return Fail(ErrorCode::kBadData,
-              "{}: found {}, and no session.json, light_directions.txt or lights.txt, nor a "
-              "lights.txt one folder up; need one of them, or the path of an .lp file",
-              path.string(), DescribeFolder(path));
+  if (options.rig_file) {
+    return PlanPhotographs(path);
+  }
+  return Fail(
+      ErrorCode::kBadData,
+      "{}: found {}, and no session.json, light_directions.txt or lights.txt, nor a "
+      "lights.txt one folder up; need one of them, the path of an .lp file, or --rig with a "
+      "light for each photograph",
+      path.string(), DescribeFolder(path));
 }
 
 // The rig that the caller gives instead of the lights of a public layout.
@@ -80,6 +88,14 @@ Status ReplaceRig(const fs::path& rig_file, CapturePlan& plan) {
   }
   plan.sha256_of_input[rig_file.string()] = *hash;
   plan.rig = *std::move(rig);
+  for (std::optional<FrameFile>& frame : plan.lit) {
+    if (frame) {
+      frame->response = plan.rig.response;
+    }
+  }
+  for (FrameFile& frame : plan.dark) {
+    frame.response = plan.rig.response;
+  }
   return {};
 }
 

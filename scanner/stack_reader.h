@@ -18,7 +18,7 @@ namespace sateen {
 
 // A capture of any layout, read into values: what the solver needs, and where it came from.
 struct Capture {
-  std::string layout;        // "session", "diligent", "lp", "lights.txt"
+  std::string layout;        // "session", "diligent", "lp", "lights.txt", "photographs"
   LightStack stack;          // K frames, all of one size
   Rig rig;                   // K lights in the order of the frames; camera where known
   std::optional<Mask> mask;  // the part of the image that counts; at least one pixel
@@ -35,12 +35,15 @@ struct ReadCaptureOptions {
   // in the same order; those of a session are matched by name.
   std::optional<std::filesystem::path> rig_file = std::nullopt;
   std::optional<std::filesystem::path> mask_file = std::nullopt;
+  // Of a folder that is no session take all photographs, one for each light, whose directions are
+  // not known yet (docs/calibration.md, Chrome spheres).
+  bool lights_unknown = false;
   Encoding encoding = Encoding::kAuto;
 };
 
 /// Reads a capture as it is: a folder with session.json (docs/formats.md), a DiLiGenT folder, an
-/// RTI .lp file, or a folder of images with a lights.txt in it or one folder up. Where a folder
-/// could be several of these, the first counts.
+/// RTI .lp file, a folder of images with a lights.txt in it or one folder up, or, with a rig file, a
+/// folder of images alone. Where a folder could be several of these, the first counts.
 ///
 /// Errors   kInvalidArgument: a light that `options` asks for does not exist, or is asked for twice
 ///          kIo: a file is absent or unreadable

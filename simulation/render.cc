@@ -75,8 +75,11 @@ bool MapPixel(const Scene& scene, int x, int y, const Eigen::Vector2d& shift_px,
   const int n = scene.lens.samples;
   Eigen::Vector3d rho = Eigen::Vector3d::Zero();
   for (int sample = 0; sample < n * n; ++sample) {
-    const double du = (sample % n + 0.5) / n - 0.5;
-    const double dv = (sample / n + 0.5) / n - 0.5;  // NOLINT: whole rows of samples
+    // No two in one row or column, so that an edge along either is resolved to 1 / n^2 of a pixel.
+    const int column = sample % n;
+    const int row = sample / n;
+    const double du = (column + (row + 0.5) / n) / n - 0.5;
+    const double dv = (row + (column + 0.5) / n) / n - 0.5;
     const std::optional<Eigen::Vector3d> part_of_pixel =
         n == 1 ? at : SurfacePointOfPixel(scene, u + du, v + dv);
     if (!part_of_pixel) {

@@ -38,12 +38,16 @@ Eigen::Vector3d Evaluated(const WavyAlbedo& albedo, double x, double y) {
   return albedo.min + (albedo.max - albedo.min) * (0.5 + 0.5 * phase.sin());
 }
 
-Eigen::Vector3d Evaluated(const ChessboardAlbedo& albedo, double x, double y) {
-  const double column = std::floor(x / albedo.square_mm + 0.5 * albedo.columns);
-  const double row = std::floor(y / albedo.square_mm + 0.5 * albedo.rows);
-  const bool inside = column >= 0.0 && column < albedo.columns && row >= 0.0 && row < albedo.rows;
-  const bool dark = inside && std::fmod(column + row, 2.0) == 0.0;
-  return Eigen::Vector3d::Constant(dark ? albedo.dark : albedo.light);
+Eigen::Vector3d Evaluated(const PrintAlbedo& albedo, double x, double y) {
+  // The point of the print's plane over (x, y): p = R q + t with q.z = 0, of which x and y do.
+  const Eigen::Matrix3d& r = albedo.table_from_print.linear();
+  const Eigen::Vector2d from_origin =
+      Eigen::Vector2d(x, y) - albedo.table_from_print.translation().head<2>();
+  const Eigen::Vector2d q = r.topLeftCorner<2, 2>().inverse() * from_origin;
+  if (albedo.beyond && !albedo.print.Covers(q)) {
+    return Eigen::Vector3d::Constant(*albedo.beyond);
+  }
+  return Eigen::Vector3d::Constant(albedo.print.IsBlackAt(q) ? albedo.dark : albedo.light);
 }
 
 Eigen::Vector3d Evaluated(const PatchesAlbedo& albedo, double x, double y) {
@@ -73,17 +77,17 @@ Status CheckAlbedo(const WavyAlbedo& albedo) {
   return CheckLength("texture.period_mm", albedo.period_mm);
 }
 
-Status CheckAlbedo(const ChessboardAlbedo& albedo) {
-  if (std::min(albedo.columns, albedo.rows) < 2) {
-    return BadValue("texture.columns, rows", std::min(albedo.columns, albedo.rows), "2 or more");
-  }
-  if (Status status = CheckLength("texture.square_mm", albedo.square_mm); !status) {
-    return status;
-  }
+Status CheckAlbedo(const PrintAlbedo& albedo) {
   if (!IsFraction(albedo.dark)) {
     return BadValue("texture.dark", albedo.dark, "0 to 1");
   }
-  return IsFraction(albedo.light) ? Status() : BadValue("texture.light", albedo.light, "0 to 1");
+  if (!IsFraction(albedo.light)) {
+    return BadValue("texture.light", albedo.light, "0 to 1");
+  }
+  if (albedo.beyond && !IsFraction(*albedo.beyond)) {
+    return BadValue("texture.beyond", *albedo.beyond, "0 to 1");
+  }
+  return {};
 }
 
 Status CheckAlbedo(const PatchesAlbedo& albedo) {
@@ -210,6 +214,13 @@ Status Scene::Validate() const {
   }
   if (!rig.camera) {
     return Fail(ErrorCode::kInvalidArgument, "the rig has no camera; need one, for the frames");
+  }
+  if (!rig.camera->has_pose) {
+    return Fail(ErrorCode::kInvalidArgument,
+                "the rig's camera has no table_from_camera; need it, for the frames");
+  }
+  if (rig.lights.empty()) {
+    return Fail(ErrorCode::kInvalidArgument, "the rig has no lights; need one, for the frames");
   }
   if (!(surface->MaxSlope() <= kSteepest)) {
     return Fail(ErrorCode::kInvalidArgument,

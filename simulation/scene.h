@@ -1,9 +1,10 @@
 #pragma once
 
-#include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <variant>
 #include <vector>
@@ -12,6 +13,7 @@
 #include "reflectance/brdf.h"
 #include "rig/rig.h"
 #include "simulation/surface.h"
+#include "targets/print.h"
 
 namespace sateen {
 
@@ -25,20 +27,23 @@ struct WavyAlbedo {
   double max = 0.8;
   double period_mm = 100.0;
 };
-// A chessboard centred on the table, light outside of it. Its corner square at low x, low y is dark.
-struct ChessboardAlbedo {
-  int columns = 10;  // squares
-  int rows = 7;
-  double square_mm = 20.0;
-  double dark = 0.05;
+// What is printed on a board or a sheet (targets/print.h), in a plane over the table. On a surface
+// that is another plane, or none, it is seen from above.
+struct PrintAlbedo {
+  Print print;
+  // Its frame: x right and y up as printed. Any z: a place (x, y) of the table shows what of the
+  // plane is above or below it.
+  Eigen::Isometry3d table_from_print = Eigen::Isometry3d::Identity();
+  double dark = 0.04;
   double light = 0.9;
+  std::optional<double> beyond = std::nullopt;  // the print's size; nothing: light
 };
 // A row of grey patches along x, centred on the table, on a ground of 0.18.
 struct PatchesAlbedo {
   std::vector<double> values;
   double patch_mm = 20.0;
 };
-using Albedo = std::variant<ConstantAlbedo, WavyAlbedo, ChessboardAlbedo, PatchesAlbedo>;
+using Albedo = std::variant<ConstantAlbedo, WavyAlbedo, PrintAlbedo, PatchesAlbedo>;
 
 [[nodiscard]] Eigen::Vector3d AlbedoAt(const Albedo& albedo, double x_mm, double y_mm);
 

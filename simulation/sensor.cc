@@ -13,6 +13,15 @@ constexpr int kSensorRows = 16;
 
 }  // namespace
 
+double Sensor::Compressed(double x) const {
+  if (x <= knee) {
+    return x;
+  }
+  const double over = (std::min(x, 1.0) - knee) / (1.0 - knee);
+  const double beyond = std::max(x - 1.0, 0.0) / (1.0 - knee);
+  return x - compression * (over * over + 2.0 * beyond);  // (4)
+}
+
 Status Sensor::Validate() const {
   const auto fail = [](std::string_view field, double value, std::string_view range) {
     return Fail(ErrorCode::kInvalidArgument, "{} = {:g}; need {}", field, value, range);
@@ -26,6 +35,23 @@ Status Sensor::Validate() const {
   }
   if (!(black_dn >= 0.0 && black_dn < white_dn && black_dn == std::floor(black_dn))) {
     return fail("black", black_dn, fmt::format("a whole number from 0 to below {:g}", white_dn));
+  }
+  if (saturation_dn && !(*saturation_dn > black_dn && *saturation_dn <= white_dn &&
+                         *saturation_dn == std::floor(*saturation_dn))) {
+    return fail("saturation", *saturation_dn,
+                fmt::format("a whole number above {:g} and up to {:g}", black_dn, white_dn));
+  }
+  for (const double sensitivity : sensitivity_rgb) {
+    if (!(sensitivity > 0.0 && sensitivity <= 10.0)) {
+      return fail("sensitivity_rgb", sensitivity, "above 0 and up to 10 each");
+    }
+  }
+  if (!(knee > 0.0 && knee < 1.0)) {
+    return fail("knee", knee, "above 0 and below 1");
+  }
+  if (!(compression >= 0.0 && compression <= 0.5 * (1.0 - knee))) {
+    return fail("compression", compression,
+                fmt::format("0 to {:g}, half of 1 - knee", 0.5 * (1.0 - knee)));
   }
   if (!(full_scale >= 1e-6 && full_scale <= 1e6)) {
     return fail("full_scale", full_scale, "1e-6 to 1e6");
@@ -75,6 +101,7 @@ Result<Image<uint16_t>> Expose(const Sensor& sensor, const Image3& radiance, uin
   }
   const ImageSize size = radiance.Size();
   const double range_dn = sensor.white_dn - sensor.black_dn;
+  const double top_dn = sensor.saturation_dn.value_or(sensor.white_dn);
   const double full_well = sensor.full_well_electrons.value_or(1.0);
   const double read_variance = sensor.read_noise_electrons * sensor.read_noise_electrons;
   Image<uint16_t> mosaic(size);
@@ -84,12 +111,13 @@ Result<Image<uint16_t>> Expose(const Sensor& sensor, const Image3& radiance, uin
         const uint8_t colour = sensor.cfa[static_cast<size_t>(y % 2 * 2 + x % 2)];
         const size_t site = mosaic.Index(x, y);
         const auto i = static_cast<double>(radiance[colour].pixels[site]);
-        double e = full_well * i / sensor.full_scale;  // (1)
+        double e = full_well * sensor.sensitivity_rgb[colour] * i / sensor.full_scale;  // (1)
         if (sensor.full_well_electrons) {
           e += std::sqrt(std::max(e, 0.0) + read_variance) * NormalDeviate(seed, site);  // (2)
         }
-        const double dn = std::round(sensor.black_dn + range_dn * e / full_well);  // (3)
-        mosaic.pixels[site] = static_cast<uint16_t>(std::clamp(dn, 0.0, sensor.white_dn));
+        const double dn =
+            std::round(sensor.black_dn + range_dn * sensor.Compressed(e / full_well));  // (3)
+        mosaic.pixels[site] = static_cast<uint16_t>(std::clamp(dn, 0.0, top_dn));
       }
     }
   });

@@ -20,19 +20,23 @@ bool IsLength(double value) { return value > 0.0 && std::isfinite(value); }
 
 class Plane final : public Surface {
  public:
-  explicit Plane(const Eigen::Vector2d& slope) : slope_(slope) {}
+  Plane(const Eigen::Vector2d& slope, double height_mm) : slope_(slope), height_mm_(height_mm) {}
   [[nodiscard]] SurfacePoint At(double x_mm, double y_mm) const override {
-    return {.height_mm = slope_.dot(Eigen::Vector2d(x_mm, y_mm)), .slope = slope_};
+    return {.height_mm = height_mm_ + slope_.dot(Eigen::Vector2d(x_mm, y_mm)), .slope = slope_};
   }
-  [[nodiscard]] double LowestMm() const override { return -HighestMm(); }
+  [[nodiscard]] double LowestMm() const override {
+    return slope_.isZero() ? height_mm_ : -std::numeric_limits<double>::infinity();
+  }
   [[nodiscard]] double HighestMm() const override {
-    return slope_.isZero() ? 0.0 : std::numeric_limits<double>::infinity();
+    return slope_.isZero() ? height_mm_ : std::numeric_limits<double>::infinity();
   }
   [[nodiscard]] double MaxSlope() const override { return slope_.norm(); }
   [[nodiscard]] double DetailMm() const override { return 1.0; }
+  [[nodiscard]] bool IsPlane() const override { return true; }
 
  private:
   Eigen::Vector2d slope_;
+  double height_mm_;
 };
 
 class SphereCap final : public Surface {
@@ -142,15 +146,19 @@ Eigen::Vector3d SurfacePoint::Normal() const {
   return Eigen::Vector3d(-slope.x(), -slope.y(), 1.0).normalized();
 }
 
-Result<SurfacePtr> MakePlane(double slope_rad, double azimuth_rad) {
+Result<SurfacePtr> MakePlane(double slope_rad, double azimuth_rad, double height_mm) {
   if (!(slope_rad >= 0.0 && slope_rad < kHalfPi)) {
     return OutOfRange("slope_rad", slope_rad, "0 <= slope_rad < pi/2");
   }
   if (!std::isfinite(azimuth_rad)) {
     return OutOfRange("azimuth_rad", azimuth_rad, "a finite angle");
   }
-  return std::make_unique<Plane>(std::tan(slope_rad) *
-                                 Eigen::Vector2d(std::cos(azimuth_rad), std::sin(azimuth_rad)));
+  if (!std::isfinite(height_mm)) {
+    return OutOfRange("height_mm", height_mm, "a finite length");
+  }
+  return std::make_unique<Plane>(
+      std::tan(slope_rad) * Eigen::Vector2d(std::cos(azimuth_rad), std::sin(azimuth_rad)),
+      height_mm);
 }
 
 Result<SurfacePtr> MakeSphereCap(double radius_mm, double edge_rad) {

@@ -39,6 +39,7 @@ class Surface {
   [[nodiscard]] virtual double MaxSlope() const = 0;
   // The size of its smallest detail, which sets how finely rays are followed.
   [[nodiscard]] virtual double DetailMm() const = 0;
+  [[nodiscard]] virtual bool IsPlane() const { return false; }
   // Names of the parts that may have a material of their own, "surface" first or the only one.
   [[nodiscard]] virtual std::vector<std::string_view> Parts() const { return {"surface"}; }
 };
@@ -48,9 +49,10 @@ using SurfacePtr = std::unique_ptr<const Surface>;
 // Shapes. Their parameters are checked by the maker, which names the first that is out of range
 // (kInvalidArgument). Angles are below pi/2.
 
-// The plane through the table's origin that rises by `slope_rad` towards `azimuth_rad` (from x
-// towards y).
-[[nodiscard]] Result<SurfacePtr> MakePlane(double slope_rad, double azimuth_rad);
+// The plane `height_mm` above the table's origin that rises by `slope_rad` towards `azimuth_rad`
+// (from x towards y).
+[[nodiscard]] Result<SurfacePtr> MakePlane(double slope_rad, double azimuth_rad,
+                                           double height_mm = 0.0);
 
 // A cap of a sphere on the table, as wide as its edge is `edge_rad` steep.
 [[nodiscard]] Result<SurfacePtr> MakeSphereCap(double radius_mm, double edge_rad);

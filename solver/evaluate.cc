@@ -7,9 +7,16 @@
 #include <vector>
 
 #include "core/angle.h"
+#include "core/check.h"
 
 namespace sateen {
 namespace {
+
+constexpr double kLowPassSdMm = 6.62;  // sqrt(ln 2) / (2 pi) * 50 mm: half of the power passes
+constexpr double kSquaresPerSd = 8.0;  // so fine that their size widens G by 0.1 %
+constexpr double kReachSd = 4.0;       // beyond which G is left out
+constexpr double kLeastWeight = 0.2;   // of G
+const double kLeastNz = std::cos(80.0 * kRadPerDeg);
 
 Status CheckSize(const NormalField& field, const Image3& truth, const char* what) {
   const ImageSize found = truth.Size();
@@ -51,7 +58,81 @@ ErrorStatistics StatisticsOf(std::vector<double> errors) {
           .max = errors.back()};
 }
 
+// Sums over the pixels of each square of `side`: how many, and their error of slope.
+struct SlopeErrors {
+  Image<double> count;
+  Image<double> x;
+  Image<double> y;
+
+  explicit SlopeErrors(ImageSize size) : count(size), x(size), y(size) {}
+};
+
+SlopeErrors SumSlopeErrors(const NormalField& field, const Image3& true_normal, int side) {
+  const ImageSize size = field.normal.Size();
+  SlopeErrors sums({(size.width + side - 1) / side, (size.height + side - 1) / side});
+  for (size_t p = 0; p < field.reason.pixels.size(); ++p) {
+    const Eigen::Vector3d t = VectorAt(true_normal, p);
+    const Eigen::Vector3d n = VectorAt(field.normal, p);
+    if (!IsSolved(field, p) || !t.allFinite() || t.z() < kLeastNz || n.z() < kLeastNz) {
+      continue;
+    }
+    const auto column = static_cast<int>(p % static_cast<size_t>(size.width)) / side;
+    const auto row = static_cast<int>(p / static_cast<size_t>(size.width)) / side;
+    sums.count.At(column, row) += 1.0;
+    sums.x.At(column, row) += t.x() / t.z() - n.x() / n.z();
+    sums.y.At(column, row) += t.y() / t.z() - n.y() / n.z();
+  }
+  return sums;
+}
+
+// The image by G along x, then transposed, so that twice is along both.
+Image<double> BlurredAndTransposed(const Image<double>& image, const std::vector<double>& g) {
+  const int reach = static_cast<int>(g.size()) - 1;
+  Image<double> blurred(image.height, image.width);
+  for (int y = 0; y < image.height; ++y) {
+    for (int x = 0; x < image.width; ++x) {
+      double sum = 0.0;
+      for (int i = std::max(0, x - reach); i <= std::min(image.width - 1, x + reach); ++i) {
+        sum += g[static_cast<size_t>(std::abs(i - x))] * image.At(i, y);
+      }
+      blurred.At(y, x) = sum;
+    }
+  }
+  return blurred;
+}
+
 }  // namespace
+
+Result<ErrorStatistics> LowFrequencyErrorDeg(const NormalField& field, const Image3& true_normal,
+                                             double pitch_mm) {
+  SATEEN_CHECK(pitch_mm > 0.0);
+  if (Status status = CheckSize(field, true_normal, "normals"); !status) {
+    return tl::unexpected(status.error());
+  }
+  const int side = std::max(1, static_cast<int>(kLowPassSdMm / kSquaresPerSd / pitch_mm));
+  const double sd = kLowPassSdMm / pitch_mm / side;  // in squares
+  std::vector<double> g;
+  for (int i = 0; i <= static_cast<int>(std::ceil(kReachSd * sd)); ++i) {
+    g.push_back(std::exp(-0.5 * i * i / (sd * sd)));
+  }
+  const double g_sum = 2.0 * std::accumulate(g.begin(), g.end(), 0.0) - g[0];
+  const double most = g_sum * g_sum * side * side;  // were every pixel compared
+  const auto blur = [&](const Image<double>& image) {
+    return BlurredAndTransposed(BlurredAndTransposed(image, g), g);
+  };
+  const SlopeErrors sums = SumSlopeErrors(field, true_normal, side);
+  const Image<double> weight = blur(sums.count);
+  const Image<double> x = blur(sums.x);
+  const Image<double> y = blur(sums.y);
+  std::vector<double> errors_deg;
+  for (size_t p = 0; p < weight.pixels.size(); ++p) {
+    if (sums.count.pixels[p] > 0.0 && weight.pixels[p] >= kLeastWeight * most) {
+      errors_deg.push_back(std::atan(std::hypot(x.pixels[p], y.pixels[p]) / weight.pixels[p]) *
+                           kDegPerRad);  // (1)
+    }
+  }
+  return StatisticsOf(std::move(errors_deg));
+}
 
 Result<ErrorStatistics> AngularErrorDeg(const NormalField& field, const Image3& true_normal,
                                         Image<float>* map) {

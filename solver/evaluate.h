@@ -27,6 +27,25 @@ struct ErrorStatistics {
                                                       const Image3& true_normal,
                                                       Image<float>* map = nullptr);
 
+/// What is left of the normals' error below 1 cycle per 50 mm: the slow slope that a wrong light
+/// leaves towards the edges, without what the weave and the noise do. Over the pixels of
+/// AngularErrorDeg() whose normals are both within 80 degrees of the view, with slopes
+/// s = -(n_x, n_y) / n_z:
+///
+///     d = G * (s_solved - s_true),   angle = atan(|d|)                                        (1)
+///
+/// G is a Gaussian of standard deviation 6.62 mm on the table, normalised over those pixels, which
+/// passes exp(-2 pi^2 6.62^2 f^2) of a wave of f cycles a mm: half of its power at 1 / (50 mm).
+///
+/// pitch_mm  from pixel to pixel on the table, > 0
+/// Returns   over the middles of squares of at most an eighth of that deviation, where a fifth of G lies on
+///           compared pixels (a corner has a quarter); count 0 where there is none
+/// Errors    kBadData when the sizes differ
+/// Cost      O(pixels)
+[[nodiscard]] Result<ErrorStatistics> LowFrequencyErrorDeg(const NormalField& field,
+                                                           const Image3& true_normal,
+                                                           double pitch_mm);
+
 // |rho - t| / t over the channels of those pixels whose true albedo t is above 0.
 [[nodiscard]] Result<ErrorStatistics> RelativeAlbedoError(const NormalField& field,
                                                           const Image3& true_albedo);

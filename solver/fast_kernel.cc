@@ -43,7 +43,7 @@ HWY_INLINE Incoming IncomingAt(const KernelLight& light, V x_mm, V y_mm) {
   Incoming in{
       {hn::Mul(to_light.x, inverse), hn::Mul(to_light.y, inverse), hn::Mul(to_light.z, inverse)},
       squared};
-  if (light.model == LightModel::kLed) {
+  if (IsLed(light.model)) {
     const Vector3 axis{hn::Set(d, light.axis[0]), hn::Set(d, light.axis[1]),
                        hn::Set(d, light.axis[2])};
     const V cosine = hn::Neg(Dot(in.l, axis));
@@ -71,11 +71,12 @@ struct Gathered {
 
 // Fills the scratch; luminance is -1 for samples that are saturated or not numbers.
 template <bool kDistant, bool kScaled>
-HWY_INLINE Gathered Gather(const KernelParams& params, const float* const* planes, size_t offset,
+HWY_INLINE Gathered Gather(const KernelParams& params, const KernelInput& input, size_t offset,
                            V x_mm, V y_mm, const Scale& scale, float* HWY_RESTRICT scratch) {
   const D d;
   const size_t lanes = hn::Lanes(d);
   const V zero = hn::Zero(d);
+  const float* const* const planes = input.planes;
   Gathered gathered{zero, zero, zero, NoLanes()};
   for (size_t k = 0; k < params.lights.size(); ++k) {
     const KernelLight& light = params.lights[k];
@@ -107,6 +108,9 @@ HWY_INLINE Gathered Gather(const KernelParams& params, const float* const* plane
               hn::Set(d, 1.0F)};
       } else {
         in = IncomingAt(light, x_mm, y_mm);
+        if (light.model == LightModel::kLedField) {
+          in.inverse_gain = hn::Mul(in.inverse_gain, hn::LoadU(d, input.inverse_gains[k] + offset));
+        }
       }
       r = hn::Mul(r, in.inverse_gain);
       g = hn::Mul(g, in.inverse_gain);
@@ -160,14 +164,14 @@ struct State {
 
 // Gathers, with `scale` such that no pixel over- or underflows.
 template <bool kDistant>
-HWY_INLINE Gathered GatherScaled(const KernelParams& params, const float* const* planes,
+HWY_INLINE Gathered GatherScaled(const KernelParams& params, const KernelInput& input,
                                  size_t offset, V x_mm, V y_mm, Scale& scale, State& state) {
   const D d;
   const DI di;
   float* scratch = state.scratch.get();
   Gathered gathered;
   if (HWY_LIKELY(!state.expect_far_from_one)) {
-    gathered = Gather<kDistant, false>(params, planes, offset, x_mm, y_mm, scale, scratch);
+    gathered = Gather<kDistant, false>(params, input, offset, x_mm, y_mm, scale, scratch);
     const V raw = gathered.brightest_raw;
     const M near_one =
         hn::And(hn::Ge(raw, hn::Set(d, kTwoToMinus40)), hn::Le(raw, hn::Set(d, kTwoTo40)));
@@ -175,7 +179,7 @@ HWY_INLINE Gathered GatherScaled(const KernelParams& params, const float* const*
       return gathered;
     }
   }
-  const VI brightest_bits = BrightestBits(params, planes, offset);
+  const VI brightest_bits = BrightestBits(params, input.planes, offset);
   const VI two_to_40 = hn::BitCast(di, hn::Set(d, kTwoTo40));
   const VI two_to_minus_40 = hn::BitCast(di, hn::Set(d, kTwoToMinus40));
   const auto small =
@@ -185,7 +189,7 @@ HWY_INLINE Gathered GatherScaled(const KernelParams& params, const float* const*
     scale = ScaleFor(brightest_bits);
   }
   if (far || state.expect_far_from_one) {
-    gathered = Gather<kDistant, true>(params, planes, offset, x_mm, y_mm, scale, scratch);
+    gathered = Gather<kDistant, true>(params, input, offset, x_mm, y_mm, scale, scratch);
   }
   state.expect_far_from_one = far;
   return gathered;
@@ -351,8 +355,7 @@ HWY_INLINE void SolveVector(const KernelParams& params, const KernelInput& input
   const V x_mm = kDistant ? hn::Zero(d) : hn::LoadU(d, input.x_mm + offset);
   const V y_mm = kDistant ? hn::Zero(d) : hn::LoadU(d, input.y_mm + offset);
   Scale scale{one, one, NoLanes()};
-  const Gathered gathered =
-      GatherScaled<kDistant>(params, input.planes, offset, x_mm, y_mm, scale, state);
+  const Gathered gathered = GatherScaled<kDistant>(params, input, offset, x_mm, y_mm, scale, state);
   const float* scratch = state.scratch.get();
   const V threshold = hn::Mul(gathered.brightest, hn::Set(d, params.shadow_level));
   const NormalEquations eq = Accumulate<kDistant>(params, scratch, threshold);

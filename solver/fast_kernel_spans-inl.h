@@ -59,7 +59,8 @@ HWY_INLINE void ForEachVector(const KernelParams& params, const KernelInput& inp
     return;
   }
   const size_t plane_count = 3 * params.lights.size();
-  std::vector<float> padded((plane_count + 2) * lanes, 0.0F);
+  const size_t light_count = params.lights.size();
+  std::vector<float> padded((plane_count + 2 + light_count) * lanes, 0.0F);
   std::vector<const float*> planes(plane_count);
   const auto pad = [&](size_t index, const float* from) {
     std::copy_n(from + whole, rest, padded.begin() + static_cast<std::ptrdiff_t>(index * lanes));
@@ -73,6 +74,13 @@ HWY_INLINE void ForEachVector(const KernelParams& params, const KernelInput& inp
     tail.x_mm = pad(plane_count, input.x_mm);
     tail.y_mm = pad(plane_count + 1, input.y_mm);
   }
+  std::vector<const float*> gains(light_count, nullptr);
+  for (size_t k = 0; input.inverse_gains != nullptr && k < light_count; ++k) {
+    if (input.inverse_gains[k] != nullptr) {
+      gains[k] = pad(plane_count + 2 + k, input.inverse_gains[k]);
+    }
+  }
+  tail.inverse_gains = gains.data();
   std::vector<uint8_t> bytes(3 * lanes, 0);
   std::fill_n(bytes.begin(), rest, uint8_t{1});
   if (input.mask != nullptr) {

@@ -29,6 +29,8 @@ double FluxScale(const Lights& lights) {
   return std::exp2(std::round(sum / static_cast<double>(lights.size())));
 }
 
+bool HasField(const Light& light) { return light.model == LightModel::kLedField; }
+
 KernelLight KernelLightOf(const Light& light, const LightFrame& frame, double flux_scale,
                           const LambertianOptions& options) {
   const bool distant = light.model == LightModel::kDistant;
@@ -68,6 +70,13 @@ Result<FastRows> FastRows::Make(const LightStack& stack, const Rig& rig,
     }
     rows.grid_ = std::move(*grid);
   }
+  if (std::ranges::any_of(rig.lights, HasField)) {
+    Result<GainRows> gains = GainRows::Make(*rig.camera, rig.lights);
+    if (!gains) {
+      return tl::unexpected(gains.error());
+    }
+    rows.gains_ = std::move(*gains);
+  }
   rows.params_.shadow_level = static_cast<float>(options.shadow_level);
   rows.params_.max_condition_squared = std::min(
       static_cast<float>(options.max_condition * options.max_condition), kFloatConditionSquared);
@@ -91,15 +100,40 @@ void FastRows::Solve(int begin, int end, NormalField& field) const {
       grid_->Row(row, std::span(x_mm).subspan(start, width), std::span(y_mm).subspan(start, width));
     }
   }
-  Run(SolveSpan, begin, end, x_mm, y_mm, field);
+  std::vector<float> gains;
+  std::vector<const float*> places;
+  FillGains(begin, end, gains, places);
+  Run(SolveSpan, begin, end, x_mm, y_mm, places.empty() ? nullptr : places.data(), field);
+}
+
+void FastRows::FillGains(int begin, int end, std::vector<float>& gains,
+                         std::vector<const float*>& places) const {
+  if (!gains_) {
+    return;
+  }
+  const auto width = static_cast<size_t>((*stack_)[0].rgb[0].width);
+  const size_t pixels = width * static_cast<size_t>(end - begin);
+  places.assign(stack_->size(), nullptr);
+  gains.resize(pixels * places.size());
+  for (size_t k = 0; k < places.size(); ++k) {
+    if (!gains_->Has(k)) {
+      continue;
+    }
+    const std::span<float> of_light = std::span(gains).subspan(k * pixels, pixels);
+    for (int row = begin; row < end; ++row) {
+      gains_->Row(k, row, of_light.subspan(width * static_cast<size_t>(row - begin), width));
+    }
+    places[k] = of_light.data();
+  }
 }
 
 void FastRows::Touch(int begin, int end, NormalField& field) const {
-  Run(TouchSpan, begin, end, {}, {}, field);
+  Run(TouchSpan, begin, end, {}, {}, nullptr, field);
 }
 
 void FastRows::Run(SpanFunction function, int begin, int end, std::span<const float> x_mm,
-                   std::span<const float> y_mm, NormalField& field) const {
+                   std::span<const float> y_mm, const float* const* inverse_gains,
+                   NormalField& field) const {
   const size_t first = field.reason.Index(0, begin);
   const size_t count = field.reason.Index(0, end) - first;
   std::vector<const float*> planes;
@@ -113,6 +147,7 @@ void FastRows::Run(SpanFunction function, int begin, int end, std::span<const fl
            {.planes = planes.data(),
             .x_mm = x_mm.empty() ? nullptr : x_mm.data(),
             .y_mm = y_mm.empty() ? nullptr : y_mm.data(),
+            .inverse_gains = inverse_gains,
             .mask = *mask_ ? at(**mask_) : nullptr,
             .count = count},
            {{at(field.normal[0]), at(field.normal[1]), at(field.normal[2])},

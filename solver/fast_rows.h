@@ -2,11 +2,13 @@
 
 #include <optional>
 #include <span>
+#include <vector>
 
 #include "core/error.h"
 #include "core/task.h"
 #include "rig/table_grid.h"
 #include "solver/fast_kernel.h"
+#include "solver/gain_rows.h"
 #include "solver/lambertian.h"
 
 namespace sateen {
@@ -31,11 +33,16 @@ class FastRows {
   FastRows(const LightStack& stack, const std::optional<Mask>& mask)
       : stack_(&stack), mask_(&mask) {}
   void Run(SpanFunction function, int begin, int end, std::span<const float> x_mm,
-           std::span<const float> y_mm, NormalField& field) const;
+           std::span<const float> y_mm, const float* const* inverse_gains,
+           NormalField& field) const;
+  // 1 / g of rows [begin, end) for each light that has a field: `gains` holds them, `places` where.
+  void FillGains(int begin, int end, std::vector<float>& gains,
+                 std::vector<const float*>& places) const;
 
   const LightStack* stack_;
   const std::optional<Mask>* mask_;
   std::optional<TableGrid> grid_;  // absent where all lights are distant
+  std::optional<GainRows> gains_;  // absent where no light has a field
   KernelParams params_;
 };
 

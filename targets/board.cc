@@ -1,9 +1,10 @@
 #include "targets/board.h"
 
-#include <charconv>
+#include <algorithm>
 #include <cmath>
 
 #include "targets/marker_dictionary.h"
+#include "targets/spec_text.h"
 
 namespace sateen {
 namespace {
@@ -15,34 +16,6 @@ constexpr std::string_view kBoardForms =
     "\"chessboard:9x6:24mm\" (inner corners, square) or "
     "\"charuco:10x7:25mm:18mm\" (squares, square, marker; then, if not the default, "
     "\":DICT_5X5_250\", \":legacy\")";
-
-std::vector<std::string_view> FieldsOf(std::string_view text) {
-  std::vector<std::string_view> fields;
-  while (true) {
-    const size_t end = text.find(':');
-    fields.push_back(text.substr(0, end));
-    if (end == std::string_view::npos) {
-      return fields;
-    }
-    text.remove_prefix(end + 1);
-  }
-}
-
-template <typename T>
-bool ReadWhole(std::string_view text, T& number) {
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
-  return error == std::errc() && end == text.data() + text.size();
-}
-
-bool ReadGrid(std::string_view text, int& columns, int& rows) {
-  const size_t cross = text.find('x');
-  return cross != std::string_view::npos && ReadWhole(text.substr(0, cross), columns) &&
-         ReadWhole(text.substr(cross + 1), rows);
-}
-
-bool ReadLength(std::string_view text, double& length_mm) {
-  return text.ends_with("mm") && ReadWhole(text.substr(0, text.size() - 2), length_mm);
-}
 
 // Fields into numbers; false where they do not have the form.
 bool ReadBoardFields(const std::vector<std::string_view>& fields, BoardSpec& spec) {

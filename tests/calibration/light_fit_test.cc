@@ -93,34 +93,6 @@ TEST(FitLight, AnLedSeenAsAPointIsNotBelieved) {
   EXPECT_LT(led.rungs[1].held_out_rms, 1.1 * led.noise_rms);
 }
 
-// Over a hundred rigs: are the standard deviations those of the errors?
-TEST(FitLight, PredictsItsErrors) {
-  SyntheticCamera small = FullCamera();
-  small.columns = 32;
-  small.rows = 21;
-  Eigen::Vector3d position = Eigen::Vector3d::Zero();
-  Eigen::Vector3d flux = Eigen::Vector3d::Zero();
-  constexpr int kRigs = 100;
-  for (uint64_t rig = 0; rig < kRigs; ++rig) {
-    Light truth = LedRing(LightModel::kNear, kRigs,
-                          (30.0 + 0.3 * static_cast<double>(rig)) * kRadPerDeg, 600.0)[rig];
-    truth.flux_rgb = {0.4, 0.36, 0.3};
-    const std::vector<SheetSample> samples = SamplesOf(small, truth, 5, 100 + rig);
-    const LightFit fit = FitLight(samples, RoughLight(truth, 15.0, 300 + rig)).value();
-    const Eigen::Vector3d off =
-        (fit.light.position_mm - truth.position_mm).cwiseQuotient(fit.position_sd_mm);
-    const Eigen::Vector3d off_flux =
-        (fit.light.flux_rgb.cwiseQuotient(truth.flux_rgb) - Eigen::Vector3d::Ones())
-            .cwiseQuotient(fit.flux_sd);
-    position += off.cwiseAbs2() / kRigs;
-    flux += off_flux.cwiseAbs2() / kRigs;
-  }
-  for (Eigen::Index c = 0; c < 3; ++c) {
-    EXPECT_NEAR(std::sqrt(position[c]), 1.05, 0.35) << c;
-    EXPECT_NEAR(std::sqrt(flux[c]), 1.05, 0.35) << c;
-  }
-}
-
 TEST(FitLight, DustAndAFoldAreLeftOut) {
   const Light truth = TrueLight(LightModel::kNear);
   std::vector<SheetSample> samples = SamplesOf(FullCamera(), truth, 5, 13);

@@ -72,6 +72,51 @@ TEST(FitPose, NoisyBoardsUnderTiltedCamerasGiveThePoseAndItsErrors) {
   EXPECT_NEAR(std::sqrt(off2), 1.0, 0.25);  // the standard deviations are those of the errors
 }
 
+// The bar: corners as FindBoard() sees them (0.045 px, board_find_test), of a board that fills the
+// picture, from straight above to a camera that leans by 25 degrees.
+TEST(FitPose, WithinTheBarFromCornersAsTheyAreFound) {
+  const Camera lens = LensOf3000Px();
+  const BoardSpec board = ParseBoardSpec("charuco:14x10:20mm:15mm").value();
+  double worst_deg = 0.0;
+  double worst_mm = 0.0;
+  for (int run = 0; run < 60; ++run) {
+    const auto pose = CameraFromBoard(17.0 * run, 0.42 * run, 40.0 * run, {10, -10, 600});
+    const PoseFit truth = FitPose(lens, SeenBoard(lens, board, pose, 0.0, 1)).value();
+    const PoseFit fit = FitPose(lens, SeenBoard(lens, board, pose, 0.045 / std::sqrt(2.0),
+                                                static_cast<uint64_t>(100 + run)))
+                            .value();
+    worst_deg = std::max(worst_deg, AngleDeg(fit.table_from_camera, truth.table_from_camera));
+    worst_mm = std::max(
+        worst_mm,
+        (fit.table_from_camera.translation() - truth.table_from_camera.translation()).norm());
+  }
+  fmt::print("worst of 60 poses: {:.4f} degrees, {:.4f} mm\n", worst_deg, worst_mm);
+  EXPECT_LT(worst_deg, 0.05);
+  EXPECT_LT(worst_mm, 0.1);
+}
+
+TEST(MeanView, AveragesPicturesOfOneBoardAndNotOfTwo) {
+  const Camera lens = LensOf3000Px();
+  const auto pose = CameraFromBoard(10, 3, 0, {0, 0, 600});
+  const BoardView exact = SeenBoard(lens, Board(), pose, 0.0, 1);
+  BoardView first = SeenBoard(lens, Board(), pose, 0.2, 1);
+  BoardView second = SeenBoard(lens, Board(), pose, 0.2, 2);
+  first.ids.erase(first.ids.begin());  // found in the second picture only
+  first.corners_px.erase(first.corners_px.begin());
+  first.points_mm.erase(first.points_mm.begin());
+  const BoardView mean = MeanView({first, second}).value();
+  EXPECT_EQ(mean.ids, exact.ids);
+  EXPECT_EQ(mean.points_mm, exact.points_mm);
+  EXPECT_EQ(mean.corners_px[0], second.corners_px[0]);
+  EXPECT_LT((mean.corners_px[7] - 0.5 * (first.corners_px[6] + second.corners_px[7])).norm(), 1e-9);
+  for (Eigen::Vector2d& corner : second.corners_px) {
+    corner.x() += 2.0;
+  }
+  second.name = "moved.jpg";
+  EXPECT_THAT(MeanView({first, second}).error().message,
+              HasSubstr("moved.jpg: its corners are 2."));
+}
+
 TEST(FitPose, ErrorsSayWhatToDo) {
   const Camera lens = LensOf3000Px();
   BoardView view = SeenBoard(lens, Board(), CameraFromBoard(0, 0, 0, {0, 0, 600}), 0.1, 1);

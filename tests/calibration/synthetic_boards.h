@@ -56,11 +56,12 @@ inline BoardView SeenBoard(const Camera& lens, const BoardSpec& spec,
 
 // Tilted each way by 35 degrees, all over the image.
 inline std::vector<BoardView> TiltedViews(const Camera& lens, const BoardSpec& spec, int count,
-                                          double noise_px, uint64_t seed) {
+                                          double noise_px, uint64_t seed,
+                                          double distance_mm = 560.0) {
   std::vector<BoardView> views;
   for (int i = 0; i < count; ++i) {
     const Eigen::Vector3d center(40.0 * (i % 3 - 1), 30.0 * (i / 3 % 3 - 1),
-                                 560.0 + 10.0 * (i % 5));
+                                 distance_mm + 10.0 * (i % 5));
     views.push_back(SeenBoard(lens, spec, CameraFromBoard(20.0 * i, 35.0, 75.0 * i, center),
                               noise_px, seed + static_cast<uint64_t>(i)));
   }

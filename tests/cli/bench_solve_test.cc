@@ -40,7 +40,7 @@ TEST(BenchSolve, PrintsTheFixedNamesAsJson) {
       EXPECT_LT(row.at("albedo_error"), 1e-5);
     }
   }
-  EXPECT_EQ(seen.size(), 4U * 5U * 2U);  // cases, backends, numbers of threads
+  EXPECT_EQ(seen.size(), 6U * 5U * 2U);  // cases, backends, numbers of threads
 }
 
 TEST(BenchSolve, DrawsThePlot) {

@@ -6,8 +6,11 @@
 #include <filesystem>
 #include <fstream>
 
+#include "calibration/flatness.h"
+#include "core/angle.h"
 #include "imaging/image_io.h"
 #include "rig/rig.h"
+#include "scanner/sheet_reader.h"
 #include "tests/cli/cli_runner.h"
 #include "tests/testing/files.h"
 
@@ -88,6 +91,16 @@ class CalibrateLightsCommand : public ::testing::Test {
 
 TempFolder* CalibrateLightsCommand::folder_ = nullptr;
 
+// How the sheets solve with lights from one way of calibrating.
+nlohmann::json Way(const nlohmann::json& report, std::string_view key) {
+  for (const nlohmann::json& way : report.at("ways")) {
+    if (way.at("way") == key) {
+      return way;
+    }
+  }
+  return {};
+}
+
 TEST_F(CalibrateLightsCommand, FiveSheetsGivePositionsDirectionsAndFlux) {
   const RunResult run =
       CalibrateLights({"--sheet", Path("flat"), "--sheet", Path("tilt-0"), "--sheet",
@@ -105,19 +118,38 @@ TEST_F(CalibrateLightsCommand, FiveSheetsGivePositionsDirectionsAndFlux) {
     EXPECT_EQ(light.at("model"), "near");
     EXPECT_NEAR(light.at("moved_mm"), 15.0, 0.5);
   }
+  fmt::print("{}\n", json.at("ways").dump(1));
+  EXPECT_LT(Way(json, "fit").at("flat_sheet_deg"), 0.05);  // the bar
+  EXPECT_LT(Way(json, "fit").at("tilted_sheets_deg"), 0.05);
+  EXPECT_GT(Way(json, "ruler").at("flat_sheet_deg"), 5.0);
+  EXPECT_GT(Way(json, "ruler_fall_off").at("flat_sheet_deg"), 0.3);
+  // A map of intensities makes its own sheet flat, and leaves the lights where the ruler had them.
+  EXPECT_LT(Way(json, "order_1886_equation").at("flat_sheet_deg"), 0.05);
+  EXPECT_GT(Way(json, "order_1886_equation").at("tilted_sheets_deg"), 0.1);
+  EXPECT_GT(Way(json, "order_1886_equation").at("direction_error_deg"), 1.0);
   const Rig rig = ReadRig(Path("five.json")).value();
   EXPECT_THAT(rig.calibration_json, HasSubstr("flat/frames/led-3.dng"));  // among the inputs
   EXPECT_TRUE(fs::exists(Path("five-lights/residuals.png")));
   EXPECT_TRUE(fs::exists(Path("five-lights/before.png")));
 }
 
-TEST_F(CalibrateLightsCommand, OneFlatSheetAsksForTilts) {
+TEST_F(CalibrateLightsCommand, OneFlatSheetSolvesFlatAndAsksForTilts) {
   const RunResult run = CalibrateLights(
       {"--sheet", Path("flat"), "--rig", Path("rough.json"), "-o", Path("one.json")});
 
   ASSERT_EQ(run.exit_status, 0) << run.log;
   EXPECT_THAT(run.out, HasSubstr("worst error against truth/rig.json"));
   EXPECT_THAT(run.log, HasSubstr("add sheets tilted by ten degrees"));
+  EXPECT_THAT(run.out, HasSubstr("the flat sheet solves flat to 0.0"));
+
+  // The bar: a flat sheet that calibrated nothing then solves flat to 0.05 degrees edge to edge.
+  Render("flat-again", 0, 0, 77, R"("albedo": [0.99, 0.99, 0.99])");
+  const Sheet again = ReadSheet(Path("flat-again"), {.rig_file = Path("one.json")}).value();
+  const SheetView view{again.grid.columns, again.grid.rows, again.samples, again.blocks};
+  const double worst_deg = FlatnessOf(view, again.rig.lights).value().worst_rad / kRadPerDeg;
+  fmt::print("another flat sheet solves flat to {:.4f} degrees\n", worst_deg);
+  EXPECT_LT(worst_deg, 0.05);
+
   const RunResult wide = CalibrateLights({"--sheet", Path("flat"), "--rig", Path("rough.json"),
                                           "-o", Path("led.json"), "--model", "led", "--json"});
   ASSERT_EQ(wide.exit_status, 0) << wide.log;
@@ -156,6 +188,39 @@ TEST_F(CalibrateLightsCommand, SwappedFramesAreFoundAndNothingIsWritten) {
   EXPECT_THAT(run.log, HasSubstr("the frame of light 'led-3' is lit from where light 'led-4' is"));
   EXPECT_FALSE(fs::exists(Path("swapped.json")));
   EXPECT_FALSE(fs::exists(Path("swapped-lights")));
+}
+
+// One lamp's frame in two places: its own light is right, the other is that lamp again.
+TEST_F(CalibrateLightsCommand, AFrameThatIsThereTwiceIsFound) {
+  const fs::path twice = CopyOfFlat("twice");
+  std::ifstream file(twice / "session.json");
+  nlohmann::json session = nlohmann::json::parse(file);
+  for (const char* key : {"file", "sha256"}) {
+    session["frames"][4][key] = session["frames"][3][key];
+  }
+  WriteText(twice / "session.json", session.dump());
+
+  const RunResult run = CalibrateLights(
+      {"--sheet", twice.string(), "--rig", Path("rough.json"), "-o", Path("twice.json")});
+
+  EXPECT_EQ(run.exit_status, 3);
+  EXPECT_THAT(run.log, HasSubstr("the frame of light 'led-4' is lit from where light 'led-3' is"));
+  EXPECT_FALSE(fs::exists(Path("twice.json")));
+}
+
+// What lens, pose and response wrote at -o stays: the session's own rig is older.
+TEST_F(CalibrateLightsCommand, TheRigAtTheOutputIsWhatItAddsTo) {
+  fs::copy_file(Path("rough.json"), Path("grown.json"));
+  Rig grown = ReadRig(Path("grown.json")).value();
+  grown.calibration_json = R"({"lens": {"board": "mine"}})";
+  WriteText(Path("grown.json"), RigToJson(grown));
+
+  const RunResult run = CalibrateLights({"--sheet", Path("flat"), "-o", Path("grown.json")});
+
+  ASSERT_EQ(run.exit_status, 0) << run.log;
+  const Rig after = ReadRig(Path("grown.json")).value();
+  EXPECT_THAT(after.calibration_json, HasSubstr("mine"));
+  EXPECT_THAT(after.calibration_json, HasSubstr("lights"));
 }
 
 TEST_F(CalibrateLightsCommand, BadSheetsAreNamedWithTheirFault) {

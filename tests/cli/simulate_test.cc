@@ -7,6 +7,7 @@
 #include <fstream>
 
 #include "imaging/raw.h"
+#include "rig/rig.h"
 #include "scanner/session.h"
 #include "tests/cli/cli_runner.h"
 #include "tests/testing/files.h"
@@ -271,6 +272,71 @@ TEST(SimulateCommand, AMissingRigIsNamed) {
   EXPECT_EQ(run.exit_status, 4);
   EXPECT_THAT(run.log, HasSubstr("scene.json: rig: "));
   EXPECT_THAT(run.log, HasSubstr("gone.json"));
+}
+
+constexpr const char* kChartSeries = R"(, "kind": "chart",
+  "sensor": {"preset": "nikon-d5100", "black": 600, "sensitivity_rgb": [0.5, 1, 0.7],
+             "saturation": 15000},
+  "exposure": {"exposure_s": 0.02, "f_number": 8, "iso": 100, "series_s": [0.005, 0.01, 0.04],
+               "series_light": "led-3", "repeats": 2})";
+
+double MeanOf(const fs::path& path) {
+  const RawMosaic mosaic = ReadRawMosaic(path).value();
+  double sum = 0.0;
+  for (const float site : mosaic.samples.pixels) {
+    sum += static_cast<double>(site);
+  }
+  return sum / static_cast<double>(mosaic.samples.pixels.size());
+}
+
+TEST(SimulateCommand, AChartMayHaveASeriesOfExposuresInPairs) {
+  const SmallScene scene(std::string(kFlat) + kChartSeries);
+  const RunResult run = scene.Run();
+  ASSERT_EQ(run.exit_status, 0) << run.log;
+  const fs::path out = scene.Out();
+  const Session session = ReadSession(out).value();
+  ASSERT_EQ(session.frames.size(), 9U * 2U + 3U * 2U + 2U * 2U);
+  EXPECT_EQ(session.frames[6].file, "frames/led-3-0.005s-1.dng");
+  EXPECT_EQ(session.frames[6].exposure_s, 0.005);
+  EXPECT_EQ(session.frames[5].file, "frames/led-2-0.02s-2.dng");
+  EXPECT_EQ(session.frames.back().file, "frames/dark-0.04s-2.dng");
+  // As bright as the time says; the same light, another noise.
+  const double one = MeanOf(out / "frames/led-3-0.005s-1.dng");
+  EXPECT_NEAR(MeanOf(out / "frames/led-3-0.01s-1.dng") / one, 2.0, 0.01);
+  EXPECT_NEAR(MeanOf(out / "frames/led-3-0.005s-2.dng") / one, 1.0, 0.005);
+  EXPECT_NE(ReadRawMosaic(out / "frames/led-3-0.005s-1.dng")->samples.pixels,
+            ReadRawMosaic(out / "frames/led-3-0.005s-2.dng")->samples.pixels);
+  // What the chart is to tell is only in the truth; fluxes are as the sensor sees them.
+  EXPECT_FALSE(ReadRig(out / "rig.json")->response);
+  const Rig truth = ReadRig(out / "truth/rig.json").value();
+  EXPECT_EQ(truth.response->white, 15000.0);
+  EXPECT_NEAR(truth.lights[0].flux_rgb[0] / truth.lights[0].flux_rgb[1], 0.5, 1e-12);
+}
+
+TEST(SimulateCommand, ASeriesIsOfChartsInRawFilesAlone) {
+  const auto log_of = [](const std::string& rest, std::vector<std::string> options = {}) {
+    const SmallScene scene(std::string(kFlat) + rest);
+    const RunResult run = scene.Run(std::move(options));
+    EXPECT_NE(run.exit_status, 0);
+    EXPECT_FALSE(fs::exists(scene.Out()));
+    return run.log;
+  };
+  const auto exposure = [](const std::string& kind, const std::string& more) {
+    return R"(, "kind": ")" + kind +
+           R"(", "exposure": {"exposure_s": 0.02, "f_number": 8, "iso": 100, )" + more + "}";
+  };
+  EXPECT_THAT(log_of(exposure("fabric", R"("repeats": 2)")),
+              HasSubstr("exposure.repeats is for kind chart alone"));
+  EXPECT_THAT(log_of(exposure("sheet", R"("series_s": [0.01, 0.02])")),
+              HasSubstr("exposure.series_s is for kind chart alone"));
+  EXPECT_THAT(log_of(exposure("chart", R"("series_s": [])")),
+              HasSubstr("an array of finite numbers, at least one"));
+  EXPECT_THAT(log_of(exposure("chart", R"("series_s": [0])")), HasSubstr("need 1e-6 to 1e5 each"));
+  EXPECT_THAT(log_of(exposure("chart", R"("repeats": 0)")), HasSubstr("repeats 0; need 1 to 100"));
+  EXPECT_THAT(log_of(exposure("chart", R"("series_light": "led-77")")),
+              HasSubstr("exposure.series_light is 'led-77', which the rig has not"));
+  EXPECT_THAT(log_of(exposure("chart", R"("repeats": 2)"), {"--linear"}),
+              HasSubstr("exposure.repeats is of RAW frames"));
 }
 
 TEST(SimulateCommand, TheSameSceneGivesTheSameBytes) {

@@ -82,6 +82,7 @@ TEST(LightModel, NamesAreThoseOfTheFile) {
   EXPECT_EQ(Name(LightModel::kDistant), "distant");
   EXPECT_EQ(Name(LightModel::kNear), "near");
   EXPECT_EQ(Name(LightModel::kLed), "led");
+  EXPECT_EQ(Name(LightModel::kLedField), "led+field");
 }
 
 TEST(Light, ValidateNamesTheFieldOutOfRange) {

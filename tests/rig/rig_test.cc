@@ -32,7 +32,12 @@ Json FullRig() {
       {"name": "b", "channel": 5, "model": "near", "position_mm": [100, -20, 350.5],
        "flux_rgb": [1, 2, 3]},
       {"name": "c", "channel": 2, "model": "led", "position_mm": [100, 20, 350],
-       "axis": [0, -0.6, -0.8], "anisotropy": 0.7, "flux_rgb": [1, 2, 3]}],
+       "axis": [0, -0.6, -0.8], "anisotropy": 0.7, "flux_rgb": [1, 2, 3]},
+      {"name": "d", "channel": 3, "model": "led+field", "position_mm": [-100, 20, 350],
+       "axis": [0, 0.6, -0.8], "anisotropy": 0.5, "flux_rgb": [1, 2, 3],
+       "field": {"origin_mm": [-90, -60.5], "spacing_mm": 45, "columns": 5, "rows": 4,
+                 "gain": [1, 1.01, 1.02, 1.03, 1.04, 1, 1, 1, 1, 1, 0.9, 0.9, 0.9, 0.9, 0.9,
+                          1, 1, 1, 1, 0.3333333333333333]}}],
     "calibration": {"date": "2025-01-31", "figures": {"held_out": [0.01, {"x": null}]}}})");
 }
 
@@ -89,7 +94,7 @@ TEST(ReadRig, ReadsEveryKey) {
 
 TEST(ReadRig, ReadsALightOfEachModel) {
   const Lights lights = Read(FullRig().dump()).value().lights;
-  ASSERT_EQ(lights.size(), 3U);
+  ASSERT_EQ(lights.size(), 4U);
   EXPECT_EQ(lights[0].name, "a");
   EXPECT_EQ(lights[0].model, LightModel::kDistant);
   EXPECT_EQ(lights[0].direction, Eigen::Vector3d(0.6, 0, 0.8));
@@ -100,6 +105,13 @@ TEST(ReadRig, ReadsALightOfEachModel) {
   EXPECT_EQ(lights[2].model, LightModel::kLed);
   EXPECT_EQ(lights[2].axis, Eigen::Vector3d(0, -0.6, -0.8));
   EXPECT_EQ(lights[2].anisotropy, 0.7);
+  EXPECT_EQ(lights[3].model, LightModel::kLedField);
+  EXPECT_EQ(lights[3].field.origin_mm, Eigen::Vector2d(-90, -60.5));
+  EXPECT_EQ(lights[3].field.spacing_mm, 45);
+  EXPECT_EQ(lights[3].field.columns, 5);
+  EXPECT_EQ(lights[3].field.rows, 4);
+  EXPECT_EQ(lights[3].field.gain[4], 1.04);
+  EXPECT_EQ(lights[3].field.gain[10], 0.9);
 }
 
 TEST(RigToJson, RoundTripsToTheLastBit) {
@@ -162,13 +174,18 @@ TEST(ReadRig, OnlyTheKeysOfTheModelAreAllowed) {
   EXPECT_THAT(MessageWith("/lights/1/axis", {0, 0, -1}), HasSubstr("lights[1].axis is not known"));
   EXPECT_THAT(MessageWith("/lights/2/direction", {0, 0, 1}), HasSubstr("lights[2].direction is"));
   EXPECT_THAT(MessageWith("/lights/0/model", "spot"),
-              HasSubstr("lights[0].model is \"spot\"; need \"distant\", \"near\" or \"led\""));
+              HasSubstr("lights[0].model is \"spot\"; need \"distant\", \"near\", \"led\" or "
+                        "\"led+field\""));
 }
 
-TEST(ReadRig, FieldIsRefusedAndNotIgnored) {
+TEST(ReadRig, AFieldIsOfItsModelAloneAndChecked) {
   EXPECT_THAT(MessageWith("/lights/2/field", {{"grid", {1, 1}}}),
-              StartsWith("rig.json: lights[2].field is of the rung \"led + field\", which this "
-                         "version cannot use;"));
+              StartsWith("rig.json: lights[2].field"));  // not of the light's model
+  EXPECT_THAT(MessageWith("/lights/3/field/spacing_mm", -1), HasSubstr("spacing_mm is -1; need"));
+  EXPECT_THAT(MessageWith("/lights/3/field/columns", 2000000000), HasSubstr("lights[3].field"));
+  EXPECT_THAT(MessageWith("/lights/3/field/gain/7", 0), HasSubstr("a gain is 0; need above 0"));
+  EXPECT_THAT(MessageWith("/lights/3/field/unit", "mm"), HasSubstr("lights[3].field.unit"));
+  EXPECT_THAT(MessageWithout("/lights/3/field"), HasSubstr("lights[3].field"));
 }
 
 TEST(ReadRig, UnknownKeysAreErrorsAtEveryLevel) {
@@ -179,11 +196,11 @@ TEST(ReadRig, UnknownKeysAreErrorsAtEveryLevel) {
 }
 
 TEST(ReadRig, MissingKeysAreNamed) {
-  for (const char* pointer : {"/camera/model", "/camera/size_px", "/camera/k", "/camera/distortion",
-                              "/camera/table_from_camera", "/response/black", "/response/white",
-                              "/response/white_balance", "/lights/0/name", "/lights/0/channel",
-                              "/lights/0/model", "/lights/0/direction", "/lights/1/position_mm",
-                              "/lights/2/axis", "/lights/2/anisotropy", "/lights/2/flux_rgb"}) {
+  for (const char* pointer :
+       {"/camera/model", "/camera/size_px", "/camera/k", "/camera/distortion", "/response/black",
+        "/response/white", "/response/white_balance", "/lights/0/name", "/lights/0/channel",
+        "/lights/0/model", "/lights/0/direction", "/lights/1/position_mm", "/lights/2/axis",
+        "/lights/2/anisotropy", "/lights/2/flux_rgb"}) {
     const std::string key = std::filesystem::path(pointer).filename();
     EXPECT_THAT(MessageWithout(pointer), HasSubstr("." + key + " is missing; need")) << pointer;
   }
@@ -194,6 +211,26 @@ TEST(ReadRig, MissingKeysAreNamed) {
 
 TEST(ReadRig, CameraIsNeededUnlessAllLightsAreDistant) {
   EXPECT_THAT(MessageWithout("/camera"), HasSubstr("camera is missing, but lights[1] is \"near\""));
+}
+
+// What `calibrate lens` writes without a rig to begin from, and `calibrate pose` then completes.
+TEST(ReadRig, ACameraIsEnoughAndItsPoseMayCome) {
+  Json json = FullRig();
+  json["lights"] = Json::array();
+  ASSERT_TRUE(Read(json.dump()).value().RequirePose("a.json"));
+  json["camera"].erase("table_from_camera");
+  const Rig rig = Read(json.dump()).value();
+  EXPECT_FALSE(rig.camera->has_pose);
+  EXPECT_THAT(rig.RequirePose("a.json").error().message,
+              HasSubstr("a.json: the rig's camera has a lens but no pose yet"));
+  EXPECT_THAT(Rig().RequirePose("a.json").error().message, HasSubstr("the rig has no camera"));
+  EXPECT_EQ(RigToJson(Read(RigToJson(rig)).value()), RigToJson(rig));
+
+  EXPECT_THAT(MessageWithout("/camera/table_from_camera"),
+              HasSubstr("no table_from_camera, but lights[1] is \"near\""));
+  json.erase("camera");
+  EXPECT_THAT(Read(json.dump()).error().message,
+              HasSubstr("lights is empty; need at least one light, or a camera"));
 }
 
 TEST(ReadRig, ValuesOutOfRangeAreNamed) {
@@ -207,7 +244,6 @@ TEST(ReadRig, ValuesOutOfRangeAreNamed) {
               HasSubstr("white_balance is [1, 0"));
   EXPECT_THAT(MessageWith("/response/read_noise_dn", -1), HasSubstr("read_noise_dn is -1"));
   EXPECT_THAT(MessageWith("/response/gain_dn_per_electron", 0), HasSubstr("electron is 0"));
-  EXPECT_THAT(MessageWith("/lights", Json::array()), HasSubstr("lights is empty"));
   EXPECT_THAT(MessageWith("/lights/1/channel", -1), HasSubstr("lights[1]: channel is -1"));
   EXPECT_THAT(MessageWith("/lights/1/name", "a"), HasSubstr("the name \"a\" is taken"));
   EXPECT_THAT(MessageWith("/lights/1/name", ""), HasSubstr("lights[1].name is \"\"; need a name"));

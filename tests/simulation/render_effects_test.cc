@@ -32,6 +32,12 @@ Light Sun(const Eigen::Vector3d& towards) {
   return {.name = "sun", .model = LightModel::kDistant, .direction = towards.normalized()};
 }
 
+PrintAlbedo Chess(int columns, int rows, double square_mm, double dark, double light) {
+  return {.print = PrintOf({.columns = columns, .rows = rows, .square_mm = square_mm}),
+          .dark = dark,
+          .light = light};
+}
+
 RenderedFrame FrameOf(const Scene& scene) {
   Result<SceneRenderer> renderer = SceneRenderer::Create(scene);
   EXPECT_TRUE(renderer) << renderer.error().message;
@@ -95,11 +101,13 @@ TEST(Effects, PointSpreadIsTheSameGaussianAlongXAndY) {
 }
 
 TEST(Effects, EveryTextureHasItsValueInItsPlace) {
-  const ChessboardAlbedo chess{.columns = 4, .rows = 2, .square_mm = 10, .dark = 0.1, .light = 0.8};
-  EXPECT_EQ(AlbedoAt(chess, -15, -5)[0], 0.1);  // the corner at low x, low y
-  EXPECT_EQ(AlbedoAt(chess, -5, -5)[0], 0.8);
-  EXPECT_EQ(AlbedoAt(chess, -5, 5)[0], 0.1);
-  EXPECT_EQ(AlbedoAt(chess, 25, 5)[0], 0.8);  // outside
+  PrintAlbedo chess = Chess(4, 2, 10.0, 0.1, 0.8);
+  EXPECT_EQ(AlbedoAt(chess, -15, 5)[0], 0.1);  // the corner at low x, high y: the top left one
+  EXPECT_EQ(AlbedoAt(chess, -5, 5)[0], 0.8);
+  EXPECT_EQ(AlbedoAt(chess, -5, -5)[0], 0.1);
+  EXPECT_EQ(AlbedoAt(chess, -25, 5)[0], 0.8);  // outside
+  chess.beyond = 0.3;
+  EXPECT_EQ(AlbedoAt(chess, -25, 5)[0], 0.3);
   const PatchesAlbedo patches{.values = {0.9, 0.5}, .patch_mm = 10};
   EXPECT_EQ(AlbedoAt(patches, -5, 0)[1], 0.9);
   EXPECT_EQ(AlbedoAt(patches, 5, 0)[1], 0.5);
@@ -111,13 +119,33 @@ TEST(Effects, EveryTextureHasItsValueInItsPlace) {
 // One pixel half over a light square, half over a dark one.
 TEST(Effects, SamplesAverageAlbedoOverThePixel) {
   Scene scene = SceneOf(MakePlane(0, 0), Under({3, 2}, 3.0, Sun({0, 0, 1})));
-  scene.materials[0].albedo =
-      ChessboardAlbedo{.columns = 2, .rows = 2, .square_mm = 50, .dark = 0.0, .light = 1.0};
+  scene.materials[0].albedo = Chess(2, 2, 50.0, 0.0, 1.0);
   EXPECT_EQ(std::abs(Red(FrameOf(scene), 1, 0) - 0.5), 0.5);
   scene.lens.samples = 8;
   EXPECT_NEAR(Red(FrameOf(scene), 1, 0), 0.5, 1e-6);  // the edge x = 0 halves it
   scene.rig.camera->cx += 0.25;                       // seen a quarter of a pixel beside
   EXPECT_NEAR(std::abs(Red(FrameOf(scene), 1, 0) - 0.5), 0.25, 1e-6);
+}
+
+// The corners of the squares of a print that lies tilted, turned and beside the middle are where its
+// frame says, as far from each other on the slope as on paper.
+TEST(Effects, APrintLiesInThePlaneUndistorted) {
+  const double slope_rad = 0.6;
+  PrintAlbedo chess = Chess(4, 4, 10.0, 0.0, 1.0);
+  chess.table_from_print = Eigen::Translation3d(7.0, -3.0, 2.0) *
+                           Eigen::AngleAxisd(slope_rad, Eigen::Vector3d(0.6, 0.8, 0.0)) *
+                           Eigen::AngleAxisd(0.5, Eigen::Vector3d::UnitZ());
+  for (int column = 0; column < 4; ++column) {
+    for (int row = 0; row < 4; ++row) {
+      for (int corner = 0; corner < 4; ++corner) {  // just within the square's corners
+        const Eigen::Vector3d at(-20.0 + 10.0 * column + (corner % 2 == 0 ? 0.01 : 9.99),
+                                 20.0 - 10.0 * row - (corner < 2 ? 0.01 : 9.99), 0.0);
+        const Eigen::Vector3d on_table = chess.table_from_print * at;
+        EXPECT_EQ(AlbedoAt(chess, on_table.x(), on_table.y())[0], (column + row) % 2)
+            << column << ' ' << row;
+      }
+    }
+  }
 }
 
 TEST(Effects, FlickerHasItsDeviation) {
@@ -162,8 +190,7 @@ TEST(Effects, ABounceComesFromWhatIsLitWithTheAlbedoThere) {
   Scene scene = SceneOf(MakeGroove(depth, std::numbers::pi / 2),
                         Under({41, 2}, 16.0, Sun({-std::cos(0.3), 0, std::sin(0.3)})));
   // Left of x = 0 albedo 1, right of it 0.2: two squares in the middle row of three.
-  scene.materials[0].albedo =
-      ChessboardAlbedo{.columns = 2, .rows = 3, .square_mm = 500, .dark = 0.2, .light = 1.0};
+  scene.materials[0].albedo = Chess(2, 3, 500.0, 0.2, 1.0);
   scene.illumination = {.shadows = Shadows::kCast, .bounce_rays = 4900};
   const RenderedFrame frame = FrameOf(scene);
   const Result<SceneRenderer> renderer = SceneRenderer::Create(scene);

@@ -214,8 +214,8 @@ TEST(Render, LensSpreadsAPointAndDarkensCorners) {
   EXPECT_FLOAT_EQ(frame.radiance[0].At(0, 0), 0.5F * 0.7F);
   scene.lens.vignetting = {};
   scene.lens.psf_sigma_px = 2.0;
-  scene.materials[0].albedo =
-      ChessboardAlbedo{.columns = 2, .rows = 2, .square_mm = 1000.0, .dark = 0.0, .light = 1.0};
+  scene.materials[0].albedo = PrintAlbedo{
+      .print = PrintOf({.columns = 2, .rows = 2, .square_mm = 1000.0}), .dark = 0.0, .light = 1.0};
   const RenderedFrame edge = Rendered(scene);
   // An edge blurred by a Gaussian is its distribution function: pixel d + 1/2 off at d = 0, 1 ...
   // The table's x = 0 lies in the middle of pixel 50, which lies right of the edge.

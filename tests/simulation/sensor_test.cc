@@ -91,6 +91,30 @@ TEST(Sensor, TakesTheColourOfEachSite) {
   EXPECT_FALSE(BayerNamed("RGBG"));
 }
 
+TEST(Sensor, SeesEachColourWithItsOwnSensitivity) {
+  const auto mosaic = Expose({.bits = 12, .white_dn = 4000, .sensitivity_rgb = {0.5, 1.0, 0.25}},
+                             Image3({2, 2}, 0.5F), 1);
+  ASSERT_TRUE(mosaic);
+  EXPECT_EQ(mosaic->pixels, (std::vector<uint16_t>{1000, 2000, 2000, 500}));
+}
+
+TEST(Sensor, BendsAboveItsKneeAndSaturatesBelowWhite) {
+  const Sensor sensor{.bits = 14,
+                      .black_dn = 1000,
+                      .white_dn = 11000,
+                      .saturation_dn = 10900,
+                      .knee = 0.8,
+                      .compression = 0.04};
+  const auto read = [&](double radiance) {
+    return Expose(sensor, Image3({2, 2}, static_cast<float>(radiance)), 1)->pixels[0];
+  };
+  EXPECT_EQ(read(0.8), 9000);
+  EXPECT_EQ(read(0.9), 9900);    // 0.9 - 0.04 / 4
+  EXPECT_EQ(read(1.0), 10600);   // 1 - 0.04
+  EXPECT_EQ(read(1.04), 10840);  // straight on by 1 - 2 0.04 / 0.2
+  EXPECT_EQ(read(1.06), 10900);
+}
+
 TEST(Sensor, SameBitsOnAnyNumberOfThreads) {
   const Sensor sensor{.full_well_electrons = 1000, .read_noise_electrons = 3};
   const Image3 grey({97, 61}, 0.4F);
@@ -131,6 +155,12 @@ TEST(Sensor, ErrorsNameTheFieldAndItsRange) {
   EXPECT_THAT(message({.bits = 12, .white_dn = 5000}), HasSubstr("white = 5000"));
   EXPECT_THAT(message({.black_dn = 65535}), HasSubstr("black = 65535"));
   EXPECT_THAT(message({.full_scale = 0}), HasSubstr("full_scale"));
+  EXPECT_THAT(message({.saturation_dn = 70000}), HasSubstr("saturation = 70000; need a whole"));
+  EXPECT_THAT(message({.black_dn = 9, .saturation_dn = 9}), HasSubstr("saturation = 9"));
+  EXPECT_THAT(message({.sensitivity_rgb = {1, 0, 1}}), HasSubstr("sensitivity_rgb = 0"));
+  EXPECT_THAT(message({.knee = 1}), HasSubstr("knee = 1"));
+  EXPECT_THAT(message({.knee = 0.8, .compression = 0.11}),
+              HasSubstr("compression = 0.11; need 0 to 0.1, half of 1 - knee"));
   EXPECT_THAT(message({.full_well_electrons = 0}), HasSubstr("full_well_electrons"));
   EXPECT_THAT(message({.read_noise_electrons = -1}), HasSubstr("read_noise_electrons = -1"));
 }

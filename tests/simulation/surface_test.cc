@@ -44,7 +44,7 @@ Image<float> Zigzag() {
 
 std::vector<NamedSurface> AllSurfaces() {
   std::vector<NamedSurface> all;
-  all.push_back({"plane", Made(MakePlane(0.3, 1.0))});
+  all.push_back({"plane", Made(MakePlane(0.3, 1.0, -0.7))});
   all.push_back({"sphere", Made(MakeSphereCap(4.0, 1.2))});
   all.push_back({"groove", Made(MakeGroove(2.0, 1.0))});
   all.push_back({"steps", Made(MakeSteps(3, 2.0, 0.5, 0.25))});

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <Eigen/Core>
 #include <cmath>
 #include <numbers>
 
@@ -78,6 +79,83 @@ TEST(AngularErrorDeg, RefusesTruthOfAnotherSize) {
   ASSERT_FALSE(error);
   EXPECT_EQ(error.error().code, ErrorCode::kBadData);
   EXPECT_THAT(error.error().message, HasSubstr("2x1 px but the solved ones 1x1 px"));
+}
+
+// A field of solved normals whose slopes are the true ones, which are those of a weave, plus `more`.
+template <typename More>
+double WorstLowFrequencyDeg(ImageSize size, double pitch_mm, const More& more,
+                            NormalField* edited = nullptr) {
+  NormalField field;
+  field.Resize(size);
+  Image3 truth(size);
+  for (int y = 0; y < size.height; ++y) {
+    for (int x = 0; x < size.width; ++x) {
+      const size_t p =
+          static_cast<size_t>(y) * static_cast<size_t>(size.width) + static_cast<size_t>(x);
+      const Eigen::Vector2d weave(0.4 * std::sin(2.0 * x), 0.4 * std::cos(2.0 * y));
+      const Eigen::Vector2d off = more(x * pitch_mm, y * pitch_mm);
+      const Eigen::Vector3d t = Eigen::Vector3d(-weave.x(), -weave.y(), 1.0).normalized();
+      const Eigen::Vector3d n =
+          Eigen::Vector3d(-weave.x() - off.x(), -weave.y() - off.y(), 1.0).normalized();
+      for (size_t c = 0; c < 3; ++c) {
+        truth[c].pixels[p] = static_cast<float>(t[static_cast<Eigen::Index>(c)]);
+        field.normal[c].pixels[p] = static_cast<float>(n[static_cast<Eigen::Index>(c)]);
+      }
+      field.reason.pixels[p] = static_cast<uint8_t>(Reason::kSolved);
+    }
+  }
+  if (edited != nullptr) {
+    // Half of the pixels do not count, whatever they say.
+    for (size_t p = 0; p < field.reason.pixels.size(); p += 2) {
+      field.reason.pixels[p] = static_cast<uint8_t>(Reason::kDark);
+      field.normal[0].pixels[p] = 1.0F;
+      field.normal[2].pixels[p] = 0.0F;
+    }
+  }
+  return LowFrequencyErrorDeg(field, truth, pitch_mm).value().max;
+}
+
+TEST(LowFrequencyError, PassesHalfThePowerOfAWaveOf50Mm) {
+  for (const double pitch_mm : {0.5, 2.0}) {  // squares of one pixel and of fewer
+    const auto size = [&](double mm) { return static_cast<int>(mm / pitch_mm); };
+    for (const auto& [period_mm, share] : {std::pair{50.0, std::sqrt(0.5)},
+                                           {100.0, std::pow(0.5, 0.125)},
+                                           {37.5, std::pow(0.5, 0.5 * 16.0 / 9.0)}}) {
+      // exp(-2 pi^2 sd^2 f^2) is (1/2)^(1/2 (50 mm f)^2).
+      const double worst =
+          WorstLowFrequencyDeg({size(300.0), size(200.0)}, pitch_mm, [&](double x_mm, double) {
+            return Eigen::Vector2d(0.0, 1e-3 * std::cos(2.0 * std::numbers::pi * x_mm / period_mm));
+          });
+      // Even about both edges, so that half of G shows there what all of it would.
+      EXPECT_NEAR(worst, share * 1e-3 * 180.0 / std::numbers::pi, 0.15 * share * 0.0573)
+          << period_mm << " at " << pitch_mm;
+    }
+  }
+}
+
+TEST(LowFrequencyError, KeepsAConstantErrorToItsEdgesWhateverIsUnsolved) {
+  NormalField any;
+  const auto constant = [](double, double) { return Eigen::Vector2d(3e-3, -4e-3); };
+
+  // Over half of the pixels, the weave of truth and answer cancel all the same.
+  EXPECT_NEAR(WorstLowFrequencyDeg({200, 150}, 0.5, constant), 5e-3 * 180.0 / std::numbers::pi,
+              1e-5);
+  EXPECT_NEAR(WorstLowFrequencyDeg({200, 150}, 0.5, constant, &any),
+              5e-3 * 180.0 / std::numbers::pi, 1e-5);
+}
+
+TEST(LowFrequencyError, GrowsWithASlopeThatGrowsTowardsTheEdge) {
+  const double worst = WorstLowFrequencyDeg({400, 300}, 0.5, [](double x_mm, double) {
+    return Eigen::Vector2d(1e-5 * (x_mm - 100.0), 0.0);
+  });
+
+  // At the edge the half Gaussian's mean lies 0.8 sd within.
+  EXPECT_NEAR(worst, 1e-5 * (100.0 - 0.8 * 6.62) * 180.0 / std::numbers::pi, 2e-3 * 0.0573);
+}
+
+TEST(LowFrequencyError, RefusesTruthOfAnotherSize) {
+  EXPECT_EQ(LowFrequencyErrorDeg(TiltedRow({0.0}), UpwardTruth(2), 1.0).error().code,
+            ErrorCode::kBadData);
 }
 
 TEST(RelativeAlbedoError, IsRelativeToTheTruthOfEachChannel) {

@@ -1,0 +1,300 @@
+#include "calibration/response_fit.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+
+#include "simulation/random.h"
+
+namespace sateen {
+namespace {
+
+using ::testing::HasSubstr;
+
+constexpr std::array<double, 5> kReflectance = {0.9, 0.5, 0.2, 0.1, 0.04};
+constexpr int kSide = 48;  // sites of a patch
+
+// A sensor of which everything is known, before a chart of five patches.
+struct Bench {
+  double black_dn = 512.0;
+  double white_dn = 16383.0;
+  double saturation_dn = 15000.0;
+  double gain = 0.4;  // DN per electron
+  double read_noise_dn = 2.0;
+  std::array<double, 3> sensitivity = {0.5, 1.0, 0.7};
+  std::vector<double> times_s = {0.001, 0.002,  0.004,  0.008, 0.0113,
+                                 0.016, 0.0226, 0.0253, 0.037, 0.0517};
+  int repeats = 2;
+  size_t lights = 1;
+  uint64_t seed = 1000;
+  double dn_per_s = 600000.0;  // of a white diffuser, green
+  double ambient_dn_per_s = 0.0;
+  std::function<double(double)> bend = [](double dn) { return dn; };
+  // What the light does at a site of a patch, and how bright it is in a frame.
+  std::function<double(size_t patch, int x, int y)> shading = [](size_t patch, int x, int) {
+    return 1.0 - 0.1 * static_cast<double>(patch) + 0.0002 * x;
+  };
+  std::function<double(size_t frame)> flicker = [](size_t) { return 1.0; };
+
+  [[nodiscard]] std::vector<uint16_t> Patch(size_t patch, std::optional<size_t> light,
+                                            double time_s, size_t frame) const {
+    std::vector<uint16_t> dn;
+    for (int y = 0; y < kSide; ++y) {
+      for (int x = 0; x < kSide; ++x) {
+        const size_t c = ColourAt(x, y);
+        const double lit = light ? kReflectance[patch] * sensitivity[c] * shading(patch, x, y) *
+                                       dn_per_s * time_s * flicker(frame) * LightColour(*light, c)
+                                 : 0.0;
+        const double signal = lit + kReflectance[patch] * ambient_dn_per_s * time_s;
+        const double sd = std::sqrt(gain * signal + read_noise_dn * read_noise_dn);
+        const uint64_t place =
+            (patch * kSide + static_cast<size_t>(y)) * kSide + static_cast<size_t>(x);
+        const double noisy = signal + sd * NormalDeviate(seed + frame, place);
+        dn.push_back(static_cast<uint16_t>(
+            std::clamp(std::round(black_dn + bend(noisy)), 0.0, saturation_dn)));
+      }
+    }
+    return dn;
+  }
+  static size_t ColourAt(int x, int y) { return x % 2 != y % 2 ? 1 : x % 2 == 0 ? 0 : 2; }
+  static double LightColour(size_t light, size_t colour) {
+    return 1.0 + 0.05 * static_cast<double>(light) * (static_cast<double>(colour) - 1.0);
+  }
+
+  [[nodiscard]] ChartReadings Readings() const {
+    ChartReadings readings;
+    readings.file_black_dn = black_dn;
+    readings.file_white_dn = white_dn;
+    for (size_t patch = 0; patch < kReflectance.size(); ++patch) {
+      PatchSites sites;
+      for (int y = 0; y < kSide; ++y) {
+        for (int x = 0; x < kSide; ++x) {
+          sites.colour.push_back(static_cast<uint8_t>(ColourAt(x, y)));
+          sites.block.push_back(static_cast<uint8_t>(y * kPatchBlocks / kSide * kPatchBlocks +
+                                                     x * kPatchBlocks / kSide));
+        }
+      }
+      readings.patches.push_back(sites);
+      readings.patch_names.push_back(fmt::format("p{}", patch));
+      readings.reflectance_rgb.push_back(Eigen::Vector3d::Constant(kReflectance[patch]));
+    }
+    const auto add = [&](std::optional<size_t> light, double time_s) {
+      const size_t frame = readings.frames.size();
+      ChartFrame one{.file = fmt::format("f{}", frame), .light = light, .exposure_s = time_s};
+      for (size_t patch = 0; patch < kReflectance.size(); ++patch) {
+        one.dn.push_back(Patch(patch, light, time_s, frame));
+      }
+      readings.frames.push_back(one);
+    };
+    for (size_t light = 0; light < lights; ++light) {
+      readings.lights.push_back(fmt::format("led-{}", light));
+      for (const double time_s : times_s) {
+        for (int repeat = 0; repeat < repeats; ++repeat) {
+          add(light, time_s);
+        }
+      }
+    }
+    for (int repeat = 0; repeat < repeats; ++repeat) {
+      add(std::nullopt, times_s.front());
+      add(std::nullopt, times_s.back());
+    }
+    return readings;
+  }
+};
+
+ResponseFit MustFit(const Bench& bench, const ResponseFitOptions& options = {}) {
+  Result<ResponseFit> fit = FitResponse(bench.Readings(), options);
+  EXPECT_TRUE(fit) << fit.error().message;
+  return fit ? *std::move(fit) : ResponseFit();
+}
+
+std::string ErrorOf(const ChartReadings& readings, const ResponseFitOptions& options = {}) {
+  const Result<ResponseFit> fit = FitResponse(readings, options);
+  return fit ? "none" : fit.error().message;
+}
+
+TEST(ResponseFit, MeasuresALinearSensor) {
+  const ResponseFit fit = MustFit({.lights = 2});
+  EXPECT_THAT(fit.warnings, ::testing::IsEmpty());
+  EXPECT_NEAR(fit.black_dn, 512.0, 0.1);
+  EXPECT_EQ(fit.saturation_dn, 15000.0);
+  EXPECT_EQ(fit.white_dn, 15000.0);
+  ASSERT_TRUE(fit.transfer);
+  // 20 pairs of 5 patches of 2,304 sites, of which some half count: variances to 0.4 % together.
+  EXPECT_NEAR(fit.transfer->gain_dn_per_electron, 0.4, 0.006);
+  EXPECT_NEAR(fit.transfer->read_noise_dn, 2.0, 0.04);
+  EXPECT_LT(fit.transfer->misfit, 1.3);
+  EXPECT_GT(fit.transfer->misfit, 0.7);
+  for (size_t light = 0; light < 2; ++light) {
+    for (const Eigen::Index c : {0, 2}) {
+      const double expected = 1.0 / (Bench().sensitivity[static_cast<size_t>(c)] *
+                                     Bench::LightColour(light, static_cast<size_t>(c)));
+      EXPECT_NEAR(fit.lights[light]->white_balance[c] / expected, 1.0, 1e-3);
+      EXPECT_NEAR((fit.lights[light]->white_balance[c] - expected) / fit.lights[light]->sd[c], 0.0,
+                  4.0);
+    }
+    EXPECT_EQ(fit.lights[light]->patches, kReflectance.size());
+  }
+  // All: the geometric mean.
+  EXPECT_NEAR(fit.white_balance[0],
+              std::sqrt(fit.lights[0]->white_balance[0] * fit.lights[1]->white_balance[0]), 1e-12);
+  for (const ChannelLinearity& channel : fit.linearity.rgb) {
+    EXPECT_FALSE(channel.departs);
+    EXPECT_GT(channel.linear_to_dn, 0.8 * 15000.0);
+    EXPECT_LT(channel.linear_from_dn, 512.0 + 60.0);
+  }
+}
+
+TEST(ResponseFit, StatesStandardDeviationsThatItsErrorsKeepTo) {
+  // Ten sensors that differ in their noise alone.
+  double gain = 0.0;
+  double read = 0.0;
+  constexpr int kRuns = 10;
+  for (int run = 0; run < kRuns; ++run) {
+    Bench bench{.gain = 0.4 + 0.01 * run,
+                .read_noise_dn = 2.0 + 0.05 * run,
+                .times_s = {0.002, 0.004, 0.0071},
+                .seed = 1000 * (static_cast<uint64_t>(run) + 1)};
+    bench.flicker = [](size_t frame) { return 1.0 + 1e-4 * static_cast<double>(frame % 3); };
+    const PhotonTransfer transfer = *MustFit(bench).transfer;
+    gain += std::pow((transfer.gain_dn_per_electron - bench.gain) / transfer.gain_sd, 2.0) / kRuns;
+    read += std::pow((transfer.read_noise_dn - bench.read_noise_dn) / transfer.read_noise_sd, 2.0) /
+            kRuns;
+  }
+  fmt::print("errors over predicted standard deviations: gain {:.2f}, read noise {:.2f}\n",
+             std::sqrt(gain), std::sqrt(read));
+  // A root mean square of ten is within 0.5 to 1.6 with a probability of 99 %.
+  EXPECT_GT(std::sqrt(gain), 0.5);
+  EXPECT_LT(std::sqrt(gain), 1.6);
+  EXPECT_GT(std::sqrt(read), 0.5);
+  EXPECT_LT(std::sqrt(read), 1.6);
+}
+
+TEST(ResponseFit, FindsWhereASensorBendsAndStopsThere) {
+  Bench bench;
+  // Off by 1 % at 8000 DN above black, growing with the square from 4000 on.
+  bench.bend = [](double dn) {
+    const double over = std::max(dn - 4000.0, 0.0) / 4000.0;
+    return dn * (1.0 - 0.01 * over * over);
+  };
+  const ResponseFit fit = MustFit(bench);
+  EXPECT_EQ(fit.saturation_dn, 15000.0);
+  for (const ChannelLinearity& channel : fit.linearity.rgb) {
+    EXPECT_TRUE(channel.departs);
+  }
+  // Slopes are of the first half of the range, in which it bends by 0.3 % on average.
+  EXPECT_NEAR(fit.white_dn, 512.0 + 0.99 * 8000.0, 500.0);
+  // A looser tolerance goes further: 3 % at 4000 (1 + sqrt 3).
+  ResponseFitOptions loose;
+  loose.linearity.tolerance = 0.03;
+  EXPECT_NEAR(MustFit(bench, loose).white_dn, 512.0 + 0.97 * 10928.0, 500.0);
+}
+
+TEST(ResponseFit, AmbientLightGrowsWithTimeAndIsTakenOff) {
+  const ResponseFit fit = MustFit({.ambient_dn_per_s = 50000.0});
+  EXPECT_NEAR(fit.black_dn, 512.0, 0.3);
+  EXPECT_NEAR(fit.white_balance[0], 2.0, 0.004);
+  for (const ChannelLinearity& channel : fit.linearity.rgb) {
+    EXPECT_FALSE(channel.departs);
+  }
+}
+
+TEST(ResponseFit, WhatTheLightDoesOnTheChartDoesNotMatter) {
+  Bench bench;
+  bench.shading = [](size_t patch, int x, int y) {
+    return 0.3 + 0.2 * static_cast<double>(patch) + 0.002 * x - 0.001 * y;
+  };
+  const ResponseFit fit = MustFit(bench);
+  EXPECT_NEAR(fit.white_balance[0], 2.0, 0.002);
+  EXPECT_NEAR(fit.white_balance[2], 1.0 / 0.7, 0.0015);
+  EXPECT_NEAR(fit.transfer->gain_dn_per_electron, 0.4, 0.008);
+}
+
+TEST(ResponseFit, ReflectancesThatAreNotEvenAreDividedOut) {
+  ChartReadings readings = Bench().Readings();
+  for (Eigen::Vector3d& rho : readings.reflectance_rgb) {
+    rho[0] *= 1.05;  // the chart reflects 5 % more red than these sites were made with
+  }
+  const Result<ResponseFit> fit = FitResponse(readings);
+  ASSERT_TRUE(fit);
+  EXPECT_NEAR(fit->white_balance[0], 1.05 * 2.0, 0.003);
+}
+
+TEST(ResponseFit, AFrameOfAnotherExposureIsNamed) {
+  ChartReadings readings = Bench().Readings();
+  std::swap(readings.frames[4].dn, readings.frames[2].dn);  // 4 ms under 2 ms
+  EXPECT_THAT(ErrorOf(readings), HasSubstr("times as bright as its"));
+  EXPECT_THAT(ErrorOf(readings), HasSubstr("s are; are frames swapped"));
+}
+
+TEST(ResponseFit, FlickerIsWarnedOf) {
+  Bench bench;
+  bench.flicker = [](size_t frame) { return frame == 7 ? 1.012 : 1.0; };
+  const ResponseFit fit = MustFit(bench);
+  EXPECT_THAT(fit.warnings, ::testing::Contains(HasSubstr("f7: is +1.2 % off its exposure time")));
+}
+
+TEST(ResponseFit, AnUnevenPatchIsLeftOutAndNamed) {
+  Bench bench;
+  bench.shading = [](size_t patch, int x, int y) {
+    return patch == 2 && x < 6 && y < 6 ? 0.8 : 1.0;  // a speck of dust
+  };
+  const ResponseFit fit = MustFit(bench);
+  ASSERT_EQ(fit.uneven.size(), 1U);
+  EXPECT_EQ(fit.uneven[0].patch, 2U);
+  EXPECT_THAT(fit.warnings, ::testing::Contains(HasSubstr("patch 'p2' is uneven by")));
+  EXPECT_EQ(fit.lights[0]->patches, kReflectance.size() - 1);
+}
+
+TEST(ResponseFit, ASensorThatCutsOffBelowBlackIsWarnedOf) {
+  const ResponseFit fit = MustFit({.black_dn = 0.0});
+  EXPECT_THAT(fit.warnings, ::testing::Contains(HasSubstr("cuts off what lies below black")));
+  // From the lit pairs alone.
+  EXPECT_NEAR(fit.transfer->gain_dn_per_electron, 0.4, 0.012);
+}
+
+TEST(ResponseFit, WithoutASaturatedPatchTheFilesWhiteStands) {
+  const ResponseFit fit = MustFit({.times_s = {0.001, 0.002, 0.004, 0.008}});
+  EXPECT_FALSE(fit.saturation_dn);
+  EXPECT_EQ(fit.white_dn, 16383.0);
+  EXPECT_THAT(fit.warnings, ::testing::Contains(HasSubstr("no patch is saturated")));
+  EXPECT_THAT(fit.warnings, ::testing::Contains(HasSubstr("linearity was looked at up to")));
+}
+
+TEST(ResponseFit, EqualFramesHaveNoNoiseToMeasure) {
+  ChartReadings readings = Bench().Readings();
+  for (size_t f = 0; f + 1 < readings.frames.size(); f += 2) {
+    readings.frames[f + 1].dn = readings.frames[f].dn;  // one frame copied
+  }
+  for (ChartFrame& frame : readings.frames) {
+    if (!frame.light) {
+      frame.dn = readings.frames.back().dn;
+    }
+  }
+  const Result<ResponseFit> fit = FitResponse(readings);
+  ASSERT_TRUE(fit) << fit.error().message;
+  EXPECT_FALSE(fit->transfer);
+  EXPECT_THAT(fit->warnings, ::testing::Contains(HasSubstr("gain and read noise are left out")));
+}
+
+TEST(ResponseFit, ErrorsSayWhatIsMissing) {
+  EXPECT_THAT(ErrorOf(Bench{.times_s = {0.004, 0.008}}.Readings()),
+              HasSubstr("no light has frames of more than 2 exposure times"));
+  EXPECT_THAT(ErrorOf(Bench{.dn_per_s = 1000.0}.Readings()), HasSubstr("did the light come on?"));
+  EXPECT_THAT(ErrorOf(Bench{.dn_per_s = 4e9}.Readings()), HasSubstr("every patch is saturated"));
+  ChartReadings no_dark = Bench().Readings();
+  std::erase_if(no_dark.frames, [](const ChartFrame& frame) { return !frame.light; });
+  EXPECT_THAT(ErrorOf(no_dark), HasSubstr("no dark frame"));
+  const Bench curve{
+      .bend = [](double dn) { return dn > 0.0 ? 16000.0 * std::pow(dn / 16000.0, 0.6) : dn; }};
+  EXPECT_THAT(ErrorOf(curve.Readings()), HasSubstr("times as bright as its"));
+  EXPECT_THAT(ErrorOf(Bench().Readings(), {.most_uneven = 0.0}), HasSubstr("most_uneven = 0"));
+  EXPECT_THAT(ErrorOf(Bench().Readings(), {.most_off = 2.0}), HasSubstr("most_off = 2"));
+  EXPECT_THAT(ErrorOf(Bench().Readings(), {.linearity = {.tolerance = 0.0}}),
+              HasSubstr("tolerance = 0"));
+}
+
+}  // namespace
+}  // namespace sateen
