@@ -49,22 +49,6 @@ void ScaleFlux(const std::vector<SheetSample>& samples, double albedo, Light& li
   }
 }
 
-double WorstSdOfDirection(const std::vector<SheetSample>& samples,
-                          const Eigen::Vector3d& position_mm, const Eigen::Matrix3d& covariance) {
-  double worst = 0.0;
-  for (const SheetSample& sample : samples) {
-    const Eigen::Vector3d d = position_mm - sample.point_mm;
-    const Eigen::Vector3d l = d.normalized();
-    const Eigen::Matrix3d across = (Eigen::Matrix3d::Identity() - l * l.transpose()) / d.norm();
-    const Eigen::Matrix3d spread = across * covariance * across.transpose();
-    worst = std::max(worst,
-                     Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(spread, Eigen::EigenvaluesOnly)
-                         .eigenvalues()
-                         .maxCoeff());
-  }
-  return std::sqrt(worst);
-}
-
 Status CheckSamples(const std::vector<SheetSample>& samples) {
   if (samples.size() < kFewestOfALight) {
     return Fail(ErrorCode::kDegenerate, "{} samples of the sheet; need at least {}", samples.size(),
@@ -198,8 +182,8 @@ Status FitToAll(const LightResiduals& residuals, const RungFit& best, const Ligh
   const Eigen::MatrixXd covariance = fit->covariance * (scale * scale);
   result.position_sd_mm = covariance.diagonal().head<3>().cwiseSqrt();
   result.flux_sd = covariance.diagonal().tail<3>().cwiseSqrt();
-  result.direction_sd_rad = WorstSdOfDirection(residuals.Samples(), result.light.position_mm,
-                                               covariance.topLeftCorner<3, 3>());
+  result.direction_sd_rad = WorstDirectionSd(residuals.Samples(), result.light.position_mm,
+                                             covariance.topLeftCorner<3, 3>());
   return {};
 }
 

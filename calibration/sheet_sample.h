@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <vector>
 
 namespace sateen {
 
@@ -12,6 +13,12 @@ struct SheetSample {
   Eigen::Vector3d sd_rgb =
       Eigen::Vector3d::Ones();  // standard deviation of that mean, up to a factor
 };
+
+// The largest standard deviation [rad] of the direction from the samples to a light whose position has
+// this covariance [mm^2].
+[[nodiscard]] double WorstDirectionSd(const std::vector<SheetSample>& samples,
+                                      const Eigen::Vector3d& position_mm,
+                                      const Eigen::Matrix3d& covariance);
 
 // Why a light has no samples.
 enum class FrameFault { kNone, kDark, kSaturated };

@@ -51,8 +51,10 @@ void ShowText(cairo_t* cr, const std::string& text, double size_mm, double width
 
 void DrawRuler(cairo_t* cr, const Page& page, double y) {
   const double left = 0.5 * (page.paper_mm.x() - page.ruler_mm);
-  for (double at = 0.0; at <= page.ruler_mm; at += kTickMm) {
-    const bool is_end = at == 0.0 || at + kTickMm > page.ruler_mm;
+  const int ticks = static_cast<int>(page.ruler_mm / kTickMm);
+  for (int tick = 0; tick <= ticks; ++tick) {
+    const double at = tick * kTickMm;
+    const bool is_end = tick == 0 || tick == ticks;
     cairo_move_to(cr, left + at, y - (is_end ? 3.0 : 1.5));
     cairo_line_to(cr, left + at, y);
   }
