@@ -45,7 +45,8 @@ tidy: setup  ## clang-tidy over the libraries and the program
 asan: setup  ## All tests under the address and undefined-behaviour sanitizers
 	@cmake --preset asan --log-level=WARNING
 	@cmake --build --preset asan -j$(JOBS)
-	@UBSAN_OPTIONS=print_stacktrace=1 $(CTEST) --test-dir build/asan
+	@UBSAN_OPTIONS=print_stacktrace=1 LSAN_OPTIONS="suppressions=$(CURDIR)/tests/lsan.supp" \
+	    $(CTEST) --test-dir build/asan
 
 # By hand and not in CI: the system's oneTBB and OpenImageIO are not instrumented, and some runs
 # report how they hand work from thread to thread. Look for our own files in what it prints.
