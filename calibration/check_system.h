@@ -15,6 +15,7 @@ namespace sateen {
 struct CheckedSheet {
   int columns = 0;  // blocks of a frame
   int rows = 0;
+  int blank_blocks = 0;  // how many may have samples: those inside a border; 0: all
   std::vector<std::vector<SheetSample>> samples;  // [light]; empty: no usable frame
   std::vector<std::vector<int>> blocks;           // [light]: which block each sample is, row-major
 };

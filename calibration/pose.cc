@@ -11,14 +11,6 @@ namespace {
 
 constexpr double kPoseStep = 1e-6;  // of numeric derivatives, rad or mm
 
-Eigen::Isometry3d CameraFromTable(const Eigen::Isometry3d& camera_from_board) {
-  const Eigen::Vector3d z = camera_from_board.linear().col(2);
-  const Eigen::Vector3d x = (Eigen::Vector3d::UnitX() - z.x() * z).normalized();
-  Eigen::Isometry3d camera_from_table = camera_from_board;
-  camera_from_table.linear() << x, z.cross(x), z;
-  return camera_from_table;
-}
-
 // Derivative of the camera's small rotation and position in the table frame by w and d of the
 // pose solved for.
 Matrix6d TableJacobian(const Eigen::Isometry3d& camera_from_board) {
@@ -42,6 +34,14 @@ Matrix6d TableJacobian(const Eigen::Isometry3d& camera_from_board) {
 constexpr double kStillPx = 0.5;
 
 }  // namespace
+
+Eigen::Isometry3d CameraFromTable(const Eigen::Isometry3d& camera_from_board) {
+  const Eigen::Vector3d z = camera_from_board.linear().col(2);
+  const Eigen::Vector3d x = (Eigen::Vector3d::UnitX() - z.x() * z).normalized();
+  Eigen::Isometry3d camera_from_table = camera_from_board;
+  camera_from_table.linear() << x, z.cross(x), z;
+  return camera_from_table;
+}
 
 Result<BoardView> MeanView(const std::vector<BoardView>& views) {
   SATEEN_CHECK(!views.empty());

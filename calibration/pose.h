@@ -32,6 +32,9 @@ struct PoseFit {
 /// Errors   as SolvePlanePose(); kInvalidArgument: another picture size than the lens's
 [[nodiscard]] Result<PoseFit> FitPose(const Camera& lens, const BoardView& board);
 
+// The table frame of a lying board, as FitPose() has it.
+[[nodiscard]] Eigen::Isometry3d CameraFromTable(const Eigen::Isometry3d& camera_from_board);
+
 /// The corners of several pictures of one board that nobody moved, each the mean of where it was
 /// seen, in the order of their ids.
 ///

@@ -74,7 +74,9 @@ SheetSurface SurfaceOf(const CheckedSheet& sheet, const Lights& lights,
     return surface;
   }
   const double noise = std::max(Median(left), 1e-9);
-  double spots = static_cast<double>(blocks.size() - found.size());  // nothing there: no paper
+  const double count =
+      sheet.blank_blocks > 0 ? sheet.blank_blocks : static_cast<double>(blocks.size());
+  double spots = count - static_cast<double>(found.size());  // nothing there: no paper
   double folds = 0.0;
   for (const Found& block : found) {
     const double slope = block.is.tail<2>().norm();
@@ -88,8 +90,8 @@ SheetSurface SurfaceOf(const CheckedSheet& sheet, const Lights& lights,
       surface.steepest_deg = std::max(surface.steepest_deg, std::atan(slope) * kDegPerRad);
     }
   }
-  surface.spots = spots / static_cast<double>(blocks.size());
-  surface.folds = folds / static_cast<double>(blocks.size());
+  surface.spots = spots / count;
+  surface.folds = folds / count;
   return surface;
 }
 

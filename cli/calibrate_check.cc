@@ -69,6 +69,13 @@ class RigChecker {
     if (!args_.rig.empty()) {
       options.rig_file = args_.rig;
     }
+    if (!args_.border.empty()) {
+      Result<SheetBorder> border = ParseSheetBorder(args_.border);
+      if (!border) {
+        return tl::unexpected(border.error());
+      }
+      options.border = *std::move(border);
+    }
     for (const fs::path& dir : args_.sheets) {
       Result<Sheet> sheet = ReadSheet(dir, options, task_);
       if (!sheet) {
@@ -94,6 +101,7 @@ class RigChecker {
       }
       views_.push_back({.columns = sheet->grid.columns,
                         .rows = sheet->grid.rows,
+                        .blank_blocks = sheet->blank_blocks,
                         .samples = std::move(sheet->samples),
                         .blocks = std::move(sheet->blocks)});
       result_.rig = std::move(sheet->rig);
@@ -137,6 +145,10 @@ void AddCalibrateCheck(CLI::App& calibrate, CalibrateCheckArgs& args) {
                   "Session of a white sheet that lies flat; more, tilted ones, see smaller moves")
       ->required();
   cmd->add_option("--rig", args.rig, "The rig to check; the session's own");
+  cmd->add_option(
+      "--border", args.border,
+      "Marker border printed on the sheets, such as sheet:A4:12mm; tells where they lie "
+      "where sessions have no table_from_sheet");
   cmd->add_option("-o,--output", args.output,
                   "Folder for ratio.png, today's paper over what the rig says, and check.json");
   cmd->add_option("--albedo", args.options.albedo, "Albedo of the paper, above 0 and up to 1")

@@ -16,6 +16,7 @@ namespace sateen::cli {
 struct CalibrateCheckArgs {
   std::vector<std::filesystem::path> sheets;
   std::filesystem::path rig;     // empty: the session's own
+  std::string border;            // what is printed on the sheets; empty: nothing
   std::filesystem::path output;  // folder for pictures and the report; empty: none
   LightCheckOptions options;
   double max_ambient_percent = 5.0;  // of the dimmest light

@@ -148,10 +148,11 @@ void SayWhatIsWrong(const CalibrateCheckArgs& args, CalibrationCheck& result) {
   }
   if (is_unclear) {
     result.notes.push_back(
-        fmt::format("a light's direction is seen to {:.2f} degrees only, {:g} of which are needed "
-                    "for an alarm; "
-                    "tilted sheets (--sheet) or more pixels see smaller moves",
-                    direction_sd_deg, args.options.significance));
+        fmt::format("directions that changed by less than {:.2g} degrees would go unseen ({:g} "
+                    "standard deviations; the limit is {:g}); tilted sheets (--sheet) or more "
+                    "pixels see smaller moves",
+                    args.options.significance * direction_sd_deg, args.options.significance,
+                    args.options.max_direction_deg));
   }
 }
 
@@ -222,8 +223,10 @@ std::string TextReport(const CalibrateCheckArgs& args, const CalibrationCheck& r
   for (const std::string& fault : result.faults) {
     text += fault + "\n";
   }
+  const bool is_unclear = std::ranges::any_of(result.check.lights, &LightCheck::is_unclear);
   text += result.faults.empty()
-              ? "the calibration holds\n"
+              ? fmt::format("the calibration holds{}\n",
+                            is_unclear ? ", as far as these sheets can tell (see the note)" : "")
               : fmt::format("the calibration does not hold: {} fault{}\n", result.faults.size(),
                             result.faults.size() == 1 ? "" : "s");
   if (!args.output.empty()) {

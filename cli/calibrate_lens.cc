@@ -63,20 +63,14 @@ void WarnOfPhotos(LensCalibration& result) {
 }
 
 Status CompareWithTruth(LensCalibration& result) {
-  const fs::path session =
-      result.found.photos.front().files.front().path.parent_path().parent_path();
-  const fs::path path = session / "truth" / "rig.json";
-  std::error_code ignored;
-  if (!fs::exists(path, ignored)) {
-    return {};
-  }
-  const Result<Rig> truth = ReadRig(path);
+  const Result<std::optional<Rig>> truth =
+      ReadTrueRig(result.found.photos.front().files.front().path.parent_path().parent_path());
   if (!truth) {
     return tl::unexpected(truth.error());
   }
-  if (truth->camera) {
+  if (*truth && (*truth)->camera) {
     const Camera& a = result.fit.camera;
-    const Camera& b = *truth->camera;
+    const Camera& b = *(*truth)->camera;
     result.focal_error = std::max(std::abs(a.fx / b.fx - 1.0), std::abs(a.fy / b.fy - 1.0));
     result.principal_error_px = std::hypot(a.cx - b.cx, a.cy - b.cy);
   }
@@ -111,6 +105,7 @@ Result<LensCalibration> Calibrate(const CalibrateLensArgs& args, const Task& tas
     return tl::unexpected(std::move(error));
   }
   result.fit = *std::move(fit);
+  result.sha256_of_input = result.found.sha256_of_input;
   WarnOfPhotos(result);
   PutLens(result.fit.camera, result);
   result.pictures = args.output;
@@ -153,25 +148,7 @@ int RunCalibrateLens(const CalibrateLensArgs& args, const Task& task, std::ostre
                      std::ostream& log) {
   Result<LensCalibration> result = Calibrate(args, task.WithThreads(args.threads));
   task.ClearProgress();
-  if (result) {
-    RecordCalibration(result->rig, "lens", nlohmann::json::parse(JsonReport(args, *result)),
-                      result->found.sha256_of_input);
-    Result<fs::path> former = ReplaceRig(args.output, result->rig);
-    if (former) {
-      result->former_rig = *std::move(former);
-    } else {
-      result = tl::unexpected(former.error());
-    }
-  }
-  if (!result) {
-    log << "sateen calibrate lens: error: " << result.error().message << '\n';
-    return ExitStatus(result.error());
-  }
-  for (const std::string& warning : result->warnings) {
-    log << "sateen calibrate lens: warning: " << warning << '\n';
-  }
-  out << (args.json ? JsonReport(args, *result) + "\n" : TextReport(args, *result));
-  return 0;
+  return FinishCalibration("lens", args, std::move(result), out, log);
 }
 
 }  // namespace sateen::cli

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "calibration/lens.h"
+#include "cli/rig_calibration.h"
 #include "core/task.h"
 #include "rig/rig.h"
 #include "scanner/board_views.h"
@@ -30,18 +31,13 @@ struct Bow {
   double after_px = 0.0;   // without the lens's distortion
 };
 
-struct LensCalibration {
-  Rig rig;
+struct LensCalibration : RigCalibration {
   BoardSpec board;
   FoundBoards found;
   LensFit fit;
   Bow bow;                            // of the view that bows most
   std::optional<double> focal_error;  // relative, against truth/rig.json of a simulated board
   std::optional<double> principal_error_px;  // the same
-  std::vector<std::string> warnings;
-  std::filesystem::path pictures;
-  std::filesystem::path former_rig;  // empty: there was none
-  double seconds = 0.0;
 };
 
 void AddCalibrateLens(CLI::App& calibrate, CalibrateLensArgs& args);

@@ -54,7 +54,7 @@ std::string JsonReport(const CalibrateLensArgs& args, const LensCalibration& res
       {"seconds", result.seconds},
       {"warnings", result.warnings},
       {"ignored", result.found.ignored},
-      {"inputs", result.found.sha256_of_input},
+      {"inputs", result.sha256_of_input},
       {"views", nlohmann::json::array()}};
   for (const LensViewReport& view : fit.views) {
     report["views"].push_back(ViewToJson(view));

@@ -193,16 +193,15 @@ class LightsCalibrator {
   }
 
   Status CompareWithTruth(Lights& truth_lights) {
-    const fs::path path = args_.sheets[0] / "truth" / "rig.json";
-    std::error_code ignored;
-    if (!fs::exists(path, ignored)) {
-      return {};
-    }
-    const Result<Rig> truth = ReadRig(path);
+    const Result<std::optional<Rig>> truth = ReadTrueRig(args_.sheets[0]);
     if (!truth) {
       return tl::unexpected(truth.error());
     }
-    truth_lights = Rebalanced(truth->lights, WhiteBalanceOf(*truth), WhiteBalanceOf(result_.rig));
+    if (!*truth) {
+      return {};
+    }
+    truth_lights =
+        Rebalanced((*truth)->lights, WhiteBalanceOf(**truth), WhiteBalanceOf(result_.rig));
     for (size_t k = 0; k < result_.lights.size(); ++k) {
       const Light& fitted = result_.rig.lights[k];
       const auto light = std::ranges::find(truth_lights, fitted.name, &Light::name);
@@ -347,25 +346,7 @@ int RunCalibrateLights(const CalibrateLightsArgs& args, const Task& task, std::o
                        std::ostream& log) {
   Result<LightsCalibration> result = LightsCalibrator(args, task.WithThreads(args.threads)).Run();
   task.ClearProgress();
-  if (result) {
-    RecordCalibration(result->rig, "lights", nlohmann::json::parse(JsonReport(args, *result)),
-                      result->sha256_of_input);
-    Result<fs::path> former = ReplaceRig(args.output, result->rig);
-    if (former) {
-      result->former_rig = *std::move(former);
-    } else {
-      result = tl::unexpected(former.error());
-    }
-  }
-  if (!result) {
-    log << "sateen calibrate lights: error: " << result.error().message << '\n';
-    return ExitStatus(result.error());
-  }
-  for (const std::string& warning : result->warnings) {
-    log << "sateen calibrate lights: warning: " << warning << '\n';
-  }
-  out << (args.json ? JsonReport(args, *result) + "\n" : TextReport(args, *result));
-  return 0;
+  return FinishCalibration("lights", args, std::move(result), out, log);
 }
 
 }  // namespace sateen::cli

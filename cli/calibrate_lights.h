@@ -10,6 +10,7 @@
 
 #include "calibration/light_fit.h"
 #include "cli/calibrate_lights_compare.h"
+#include "cli/rig_calibration.h"
 #include "cli/sheet_figures.h"
 #include "core/task.h"
 #include "rig/rig.h"
@@ -38,16 +39,10 @@ struct LightFigures {
   std::optional<double> flux_error;           // worst channel, relative
 };
 
-struct LightsCalibration {
-  Rig rig;
+struct LightsCalibration : RigCalibration {
   std::vector<SheetFigures> sheets;  // those whose pose was found by the border
   std::vector<LightFigures> lights;  // in the rig's order
   std::vector<WayFigures> ways;      // this fit is the last
-  std::vector<std::string> warnings;
-  std::map<std::string, std::string> sha256_of_input;
-  std::filesystem::path pictures;
-  std::filesystem::path former_rig;  // empty: there was none
-  double seconds = 0.0;
 };
 
 void AddCalibrateLights(CLI::App& calibrate, CalibrateLightsArgs& args);

@@ -9,6 +9,7 @@
 
 #include "cli/rig_record.h"
 #include "core/angle.h"
+#include "scanner/pose_json.h"
 
 namespace sateen::cli {
 namespace {
@@ -18,7 +19,8 @@ namespace fs = std::filesystem;
 constexpr double kLargeErrorPx = 1.0;  // of the corners, that a lens of this picture does not have
 constexpr double kMuchLarger = 3.0;    // times the lens's own error
 constexpr double kPoorRotationDeg = 0.02;
-constexpr double kThickest = 100.0;  // [mm]
+constexpr double kOtherScale = 0.05;  // of the camera's height: a board of another size
+constexpr double kThickest = 100.0;   // [mm]
 
 // The board that the lens was calibrated with, where none is named.
 Result<BoardSpec> BoardOf(const CalibratePoseArgs& args, const Rig& rig) {
@@ -66,25 +68,43 @@ double EdgeSdMm(const Camera& camera, const Matrix6d& covariance) {
   return worst;
 }
 
-Status CompareWithTruth(PoseCalibration& result) {
+// In the table frame of the board as it truly lies.
+Status CompareWithTruth(const CalibratePoseArgs& args, PoseCalibration& result) {
   const fs::path session =
       result.found.photos.front().files.front().path.parent_path().parent_path();
-  const fs::path path = session / "truth" / "rig.json";
-  std::error_code ignored;
-  if (!fs::exists(path, ignored)) {
-    return {};
-  }
-  const Result<Rig> truth = ReadRig(path);
+  const Result<std::optional<Rig>> truth = ReadTrueRig(session);
   if (!truth) {
     return tl::unexpected(truth.error());
   }
-  if (truth->camera) {
+  const Result<std::optional<Eigen::Isometry3d>> board = ReadTruePose(session);
+  if (!board) {
+    return tl::unexpected(board.error());
+  }
+  if (*truth && (*truth)->camera) {
     const Eigen::Isometry3d& a = result.rig.camera->table_from_camera;
-    const Eigen::Isometry3d& b = truth->camera->table_from_camera;
+    const Eigen::Isometry3d board_from_table =
+        board->value_or(Eigen::Isometry3d::Identity()).inverse();
+    Eigen::Isometry3d b =
+        CameraFromTable((board_from_table * (*truth)->camera->table_from_camera).inverse())
+            .inverse();
+    b.translation().z() += args.thickness_mm;
     result.position_error_mm = (a.translation() - b.translation()).norm();
     result.rotation_error_deg = AngleDeg(a, b);
   }
   return {};
+}
+
+// A board printed larger or smaller than it says looks like a camera at another height.
+void WarnOfScale(const Eigen::Isometry3d& pose, PoseCalibration& result) {
+  const Camera& camera = *result.rig.camera;
+  const double former_mm = camera.table_from_camera.translation().z();
+  const double height_mm = pose.translation().z();
+  if (camera.has_pose && std::abs(height_mm / former_mm - 1.0) > kOtherScale) {
+    result.warnings.push_back(fmt::format(
+        "the camera stands {:.0f} mm above the table, {:.0f} mm by the former pose: where it was "
+        "not moved, the board is not of the size that {} says; measure its squares",
+        height_mm, former_mm, result.board.Text()));
+  }
 }
 
 void PutPose(const CalibratePoseArgs& args, PoseCalibration& result) {
@@ -105,6 +125,7 @@ void PutPose(const CalibratePoseArgs& args, PoseCalibration& result) {
           result.moved_mm, result.turned_deg));
     }
   }
+  WarnOfScale(pose, result);
   camera.table_from_camera = pose;
   camera.has_pose = true;
   result.edge_sd_mm = EdgeSdMm(camera, result.fit.covariance);
@@ -170,12 +191,13 @@ Result<PoseCalibration> Calibrate(const CalibratePoseArgs& args, const Task& tas
   }
   result.corners = view->ids.size();
   result.fit = *fit;
+  result.sha256_of_input = result.found.sha256_of_input;
   PutPose(args, result);
   Warn(result);
   result.pictures = args.output;
   result.pictures.replace_filename(args.output.stem().string() + "-pose");
   Status status =
-      CompareWithTruth(result).and_then([&] { return DrawPose(result, args.thickness_mm); });
+      CompareWithTruth(args, result).and_then([&] { return DrawPose(result, args.thickness_mm); });
   if (status) {
     status = task.CheckCancelled();
   }
@@ -213,25 +235,7 @@ int RunCalibratePose(const CalibratePoseArgs& args, const Task& task, std::ostre
                      std::ostream& log) {
   Result<PoseCalibration> result = Calibrate(args, task.WithThreads(args.threads));
   task.ClearProgress();
-  if (result) {
-    RecordCalibration(result->rig, "pose", nlohmann::json::parse(JsonReport(args, *result)),
-                      result->found.sha256_of_input);
-    Result<fs::path> former = ReplaceRig(args.output, result->rig);
-    if (former) {
-      result->former_rig = *std::move(former);
-    } else {
-      result = tl::unexpected(former.error());
-    }
-  }
-  if (!result) {
-    log << "sateen calibrate pose: error: " << result.error().message << '\n';
-    return ExitStatus(result.error());
-  }
-  for (const std::string& warning : result->warnings) {
-    log << "sateen calibrate pose: warning: " << warning << '\n';
-  }
-  out << (args.json ? JsonReport(args, *result) + "\n" : TextReport(args, *result));
-  return 0;
+  return FinishCalibration("pose", args, std::move(result), out, log);
 }
 
 }  // namespace sateen::cli

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "calibration/pose.h"
+#include "cli/rig_calibration.h"
 #include "core/task.h"
 #include "rig/rig.h"
 #include "scanner/board_views.h"
@@ -24,8 +25,7 @@ struct CalibratePoseArgs {
   bool json = false;
 };
 
-struct PoseCalibration {
-  Rig rig;
+struct PoseCalibration : RigCalibration {
   BoardSpec board;
   FoundBoards found;
   size_t corners = 0;
@@ -35,10 +35,6 @@ struct PoseCalibration {
   double turned_deg = 0.0;
   std::optional<double> position_error_mm;  // against truth/rig.json of a simulated board
   std::optional<double> rotation_error_deg;
-  std::vector<std::string> warnings;
-  std::filesystem::path pictures;
-  std::filesystem::path former_rig;  // empty: there was none
-  double seconds = 0.0;
 };
 
 void AddCalibratePose(CLI::App& calibrate, CalibratePoseArgs& args);

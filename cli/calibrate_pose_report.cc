@@ -142,7 +142,7 @@ std::string JsonReport(const CalibratePoseArgs& args, const PoseCalibration& res
       {"turned_deg", result.turned_deg},
       {"seconds", result.seconds},
       {"warnings", result.warnings},
-      {"inputs", result.found.sha256_of_input}};
+      {"inputs", result.sha256_of_input}};
   if (result.position_error_mm) {
     report["position_error_mm"] = *result.position_error_mm;
     report["rotation_error_deg"] = *result.rotation_error_deg;

@@ -31,23 +31,19 @@ Eigen::Vector3d BalanceOf(const Light& light, const Eigen::Vector3d& response_ba
 
 Result<std::optional<ResponseErrors>> ErrorsOf(const fs::path& dir, const ResponseFit& fit,
                                                const Rig& rig) {
-  const fs::path path = dir / "truth" / "rig.json";
-  std::error_code ignored;
-  if (!fs::exists(path, ignored)) {
-    return std::optional<ResponseErrors>();
-  }
-  const Result<Rig> truth = ReadRig(path);
+  const Result<std::optional<Rig>> truth = ReadTrueRig(dir);
   if (!truth) {
     return tl::unexpected(truth.error());
   }
-  if (!truth->response) {
+  if (!*truth || !(*truth)->response) {
     return std::optional<ResponseErrors>();
   }
-  const Response& expected = *truth->response;
+  const Lights& lights = (*truth)->lights;
+  const Response& expected = *(*truth)->response;
   ResponseErrors errors;
   for (size_t k = 0; k < fit.lights.size(); ++k) {
-    const auto light = std::ranges::find(truth->lights, rig.lights[k].name, &Light::name);
-    if (fit.lights[k] && light != truth->lights.end()) {
+    const auto light = std::ranges::find(lights, rig.lights[k].name, &Light::name);
+    if (fit.lights[k] && light != lights.end()) {
       const Eigen::Vector3d off =
           fit.lights[k]->white_balance.cwiseQuotient(BalanceOf(*light, expected.white_balance));
       errors.white_balance =
@@ -86,11 +82,14 @@ Result<ResponseCalibration> Calibrate(const CalibrateResponseArgs& args, const T
   if (!fit) {
     return Fail(fit.error().code, "{}: {}", args.chart.string(), fit.error().message);
   }
-  ResponseCalibration result{.rig = capture->rig,
-                             .capture = std::move(*capture),
-                             .fit = std::move(*fit),
-                             .tolerance = args.fit.linearity.tolerance};
-  result.capture.sha256_of_input[args.patches.string()] = *chart_hash;
+  ResponseCalibration result;
+  result.rig = capture->rig;
+  result.sha256_of_input = capture->sha256_of_input;
+  result.sha256_of_input[args.patches.string()] = *chart_hash;
+  result.warnings = fit->warnings;
+  result.capture = std::move(*capture);
+  result.fit = std::move(*fit);
+  result.tolerance = args.fit.linearity.tolerance;
   AdoptResponse(result.fit, result.rig);
   const Result<std::optional<ResponseErrors>> errors = ErrorsOf(args.chart, result.fit, result.rig);
   if (!errors) {
@@ -157,28 +156,7 @@ int RunCalibrateResponse(const CalibrateResponseArgs& args, const Task& task, st
                          std::ostream& log) {
   Result<ResponseCalibration> result = Calibrate(args, task.WithThreads(args.threads));
   task.ClearProgress();
-  if (result) {
-    nlohmann::json figures = nlohmann::json::parse(JsonReport(args, *result));
-    for (nlohmann::json& channel : figures["linearity"]) {
-      channel.erase("bins");  // a picture's worth
-    }
-    RecordCalibration(result->rig, "response", std::move(figures), result->capture.sha256_of_input);
-    Result<fs::path> former = ReplaceRig(args.output, result->rig);
-    if (former) {
-      result->former_rig = *std::move(former);
-    } else {
-      result = tl::unexpected(former.error());
-    }
-  }
-  if (!result) {
-    log << "sateen calibrate response: error: " << result.error().message << '\n';
-    return ExitStatus(result.error());
-  }
-  for (const std::string& warning : result->fit.warnings) {
-    log << "sateen calibrate response: warning: " << warning << '\n';
-  }
-  out << (args.json ? JsonReport(args, *result) + "\n" : TextReport(args, *result));
-  return 0;
+  return FinishCalibration("response", args, std::move(result), out, log);
 }
 
 }  // namespace sateen::cli

@@ -8,6 +8,7 @@
 #include <string>
 
 #include "calibration/response_fit.h"
+#include "cli/rig_calibration.h"
 #include "core/task.h"
 #include "rig/rig.h"
 #include "scanner/chart_reader.h"
@@ -33,15 +34,11 @@ struct ResponseErrors {
   std::optional<double> saturation;  // of its height above black
 };
 
-struct ResponseCalibration {
-  Rig rig;  // as it is written
+struct ResponseCalibration : RigCalibration {
   ChartCapture capture;
   ResponseFit fit;
   double tolerance = 0.01;  // of linearity
   std::optional<ResponseErrors> errors;
-  std::filesystem::path pictures;
-  std::filesystem::path former_rig;  // empty: there was none
-  double seconds = 0.0;
 };
 
 /// Gives a rig the response that was measured. Fluxes are in balanced units (scanner/sensor_reading.h),

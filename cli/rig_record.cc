@@ -28,6 +28,11 @@ void RecordCalibration(Rig& rig, std::string_view kind, nlohmann::json figures,
   for (const char* key : {"output", "former_rig", "pictures"}) {
     figures.erase(key);  // names of one machine, and of one moment
   }
+  if (const auto linearity = figures.find("linearity"); linearity != figures.end()) {
+    for (nlohmann::json& channel : *linearity) {
+      channel.erase("bins");  // a picture's worth
+    }
+  }
   figures["date"] = TimeAs("%Y-%m-%dT%H:%M:%SZ");
   figures["version"] = SATEEN_VERSION;
   figures["inputs"] = sha256_of_input;

@@ -36,6 +36,7 @@ struct Sheet {
   bool pose_is_recorded = false;        // else taken to lie on the table, or:
   std::optional<SheetPose> found_pose;  // by its border
   BlockGrid grid;
+  int blank_blocks = 0;  // blocks of the grid that lie inside the border; without one, all
   std::vector<std::vector<SheetSample>> samples;  // [light][block that can be used, row by row]
   std::vector<std::vector<int>> blocks;           // [light]: which block each sample is
   std::vector<FrameFault> faults;                 // [light]: kNone, or why it has no samples

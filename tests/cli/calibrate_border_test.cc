@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <fstream>
 
+#include "cli/calibrate_check.h"
 #include "cli/calibrate_lights.h"
 #include "rig/rig.h"
 #include "tests/cli/cli_runner.h"
@@ -144,6 +145,22 @@ TEST_F(CalibrateBorder, RecordedPosesComeFirst) {
   const RunResult found = Calibrate({"recorded"}, {"--border", kBorder, "--find-poses", "--json"});
   ASSERT_EQ(found.exit_status, 0) << found.log;
   EXPECT_EQ(found.Json().at("sheets").size(), 1U);
+}
+
+// The rig that the sheets gave, checked on one of them: print is no fault where the border is named.
+TEST_F(CalibrateBorder, ACheckLeavesThePrintOut) {
+  ASSERT_EQ(Calibrate({"flat", "tilt-1", "tilt-3"}, {"--border", kBorder}).exit_status, 0);
+  const auto check = [](const std::vector<std::string>& more) {
+    std::vector<std::string> words = {"check", "--rig", Path("rig.json"), "--sheet",
+                                      Path("tilt-1")};
+    words.insert(words.end(), more.begin(), more.end());
+    return sateen::testing::RunCommand<cli::CalibrateCheckArgs>(
+        std::move(words), cli::AddCalibrateCheck, cli::RunCalibrateCheck);
+  };
+  const RunResult bordered = check({"--border", kBorder});
+  EXPECT_EQ(bordered.exit_status, 0) << bordered.out << bordered.log;
+  EXPECT_EQ(check({}).exit_status, 3);
+  EXPECT_EQ(check({"--border", "sheet:A4"}).exit_status, 2);
 }
 
 // A fold along y, 0.6 mm deep and 4.5 mm wide.

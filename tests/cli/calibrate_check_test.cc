@@ -92,7 +92,10 @@ TEST_F(CalibrateCheckCommand, HoldsOnACleanSheetAndDrawsIt) {
   const RunResult run = Check("clean", {"-o", Path("pictures")});
 
   EXPECT_EQ(run.exit_status, 0) << run.log;
-  EXPECT_THAT(run.out, HasSubstr("the calibration holds\n"));
+  EXPECT_THAT(run.log,
+              HasSubstr("directions that changed by less than 0.23 degrees would go unseen"));
+  EXPECT_THAT(run.out,
+              HasSubstr("the calibration holds, as far as these sheets can tell (see the note)\n"));
   EXPECT_TRUE(fs::exists(Path("pictures/ratio.png")));
   std::ifstream file(Path("pictures/check.json"));
   const nlohmann::json json = nlohmann::json::parse(file);
@@ -100,6 +103,7 @@ TEST_F(CalibrateCheckCommand, HoldsOnACleanSheetAndDrawsIt) {
   EXPECT_EQ(json.at("holds"), true);
   EXPECT_EQ(json.at("lights").size(), 10U);
   EXPECT_THAT(json.at("inputs").dump(), HasSubstr("clean/frames/led-3.dng"));
+  EXPECT_THAT(Check("clean", {"--max-direction", "0.5"}).out, HasSubstr("the calibration holds\n"));
 }
 
 TEST_F(CalibrateCheckCommand, NamesADimLightAndABumpedOne) {

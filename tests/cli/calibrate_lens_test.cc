@@ -176,6 +176,27 @@ TEST_F(CalibrateLensCommand, PoseUnderTheTrueLens) {
   EXPECT_LT((b.linear() - a.linear()).norm(), 1e-12);
 }
 
+// The error against the truth is that in the frame of the board, which lies aside and turned.
+TEST_F(CalibrateLensCommand, PoseOfABoardLyingAside) {
+  Render("aside", R"("shape": "plane")", "[25, -15]", 20, /*linear=*/false);
+  const RunResult run = CalibratePose({Path("aside"), "--board", kBoard, "--rig", Path("true.json"),
+                                       "-o", Path("aside.json"), "--thickness", "3", "--json"});
+  ASSERT_EQ(run.exit_status, 0) << run.log;
+  EXPECT_LT(run.Json().at("position_error_mm").get<double>(), 0.4);
+  EXPECT_LT(run.Json().at("rotation_error_deg").get<double>(), 0.05);
+  const Eigen::Isometry3d pose = ReadRig(Path("aside.json"))->camera->table_from_camera;
+  EXPECT_NEAR(pose.translation().x(), -8.0 - 25.0, 1.0);
+  EXPECT_THAT(run.log, Not(HasSubstr("measure its squares")));
+
+  // Printed at 90 % of what it says.
+  const RunResult shrunk = CalibratePose({Path("aside"), "--board", "charuco:10x7:27.8mm:20mm",
+                                          "--rig", Path("true.json"), "-o", Path("shrunk.json")});
+  ASSERT_EQ(shrunk.exit_status, 0) << shrunk.log;
+  EXPECT_THAT(shrunk.log, HasSubstr("mm above the table, 430 mm by the former pose: where it was "
+                                    "not moved, the board is not of the size that "
+                                    "charuco:10x7:27.8mm:20mm"));
+}
+
 TEST_F(CalibrateLensCommand, KeepsTheRestOfTheRigAndSaysWhatIsOutOfDate) {
   Rig rig = ReadRig(Path("true.json")).value();
   rig.lights[0].model = LightModel::kNear;
