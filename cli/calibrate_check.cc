@@ -179,7 +179,9 @@ void AddCalibrateCheck(CLI::App& calibrate, CalibrateCheckArgs& args) {
       ->check(CLI::Range(0, 1024))
       ->capture_default_str();
   cmd->add_flag("--json", args.json, "Print one JSON object on stdout instead of the table");
-  cmd->footer("Exit status 3 where the calibration does not hold.");
+  cmd->footer(
+      "Exit status 0 where nothing is wrong as far as the sheets can tell, 3 where the calibration "
+      "does not hold.");
 }
 
 int RunCalibrateCheck(const CalibrateCheckArgs& args, const Task& task, std::ostream& out,

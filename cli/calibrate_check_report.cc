@@ -4,6 +4,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "cli/canvas.h"
+
 namespace sateen::cli {
 namespace {
 
@@ -247,7 +249,9 @@ Rgb8 RatioPicture(const CalibrationCheck& result, size_t sheet, const CheckedShe
         panel[c].pixels[static_cast<size_t>(view.blocks[k][j])] = colour[c];
       }
     }
-    panels.push_back(Enlarged(panel, kRatioPanelPx / view.columns));
+    panels.push_back(
+        Captioned(Enlarged(panel, kRatioPanelPx / view.columns),
+                  fmt::format("{}: red +{:g} %", result.rig.lights[k].name, 100.0 * kShown)));
   }
   return ContactSheet(panels, kColumns);
 }

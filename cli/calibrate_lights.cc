@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "cli/calibrate_lights_report.h"
+#include "cli/canvas.h"
 #include "cli/pictures.h"
 #include "cli/rig_record.h"
 #include "core/angle.h"
@@ -233,7 +234,8 @@ class LightsCalibrator {
           kPercent * static_cast<float>(std::abs(sample.radiance_rgb[1] / green - 1.0));
       known.pixels[block] = 1;
     }
-    return Enlarged(ShowHeat(misfit, top, known), kResidualPanelPx / sheet.grid.columns);
+    return Captioned(Enlarged(ShowHeat(misfit, top, known), kResidualPanelPx / sheet.grid.columns),
+                     fmt::format("{}: white {:g} %", expected.name, top));
   }
 
   // The rough light with the flux that fits it best, as a ruler and a light meter would have it.

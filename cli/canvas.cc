@@ -9,6 +9,7 @@ namespace sateen::cli {
 namespace {
 
 constexpr int kShift = 4;  // fractional bits of OpenCV's coordinates
+constexpr int kCaptionPx = 22;
 constexpr double kTextScale = 0.55;
 
 cv::Point PointOf(const Eigen::Vector2d& at) {
@@ -92,6 +93,13 @@ Rgb8 Canvas::Taken() const {
     picture[i % 3].pixels[i / 3] = pixels_[i];
   }
   return picture;
+}
+
+Rgb8 Captioned(const Rgb8& panel, const std::string& caption) {
+  Canvas canvas(panel[0].width, panel[0].height + kCaptionPx, kWhiteInk);
+  canvas.Place(panel, 0, 0);
+  canvas.Text({2.0, panel[0].height + 0.75 * kCaptionPx}, caption, kBlackInk);
+  return canvas.Taken();
 }
 
 Rgb8 ScaledGrey(const Image<uint8_t>& grey, double factor) {

@@ -13,6 +13,7 @@ namespace sateen::cli {
 using Color8 = std::array<uint8_t, 3>;  // red, green, blue
 
 inline constexpr Color8 kWhiteInk = {255, 255, 255};
+inline constexpr Color8 kBlackInk = {20, 20, 20};
 inline constexpr Color8 kGreyInk = {150, 150, 150};
 inline constexpr Color8 kRedInk = {255, 70, 60};
 inline constexpr Color8 kGreenInk = {70, 220, 90};
@@ -42,6 +43,9 @@ class Canvas {
   int height_;
   std::vector<uint8_t> pixels_;  // interleaved red, green, blue
 };
+
+// The panel with a line of text under it.
+[[nodiscard]] Rgb8 Captioned(const Rgb8& panel, const std::string& caption);
 
 // `grey` as large as `width` asks, between pixels linearly, with `factor` = new / old size.
 [[nodiscard]] Rgb8 ScaledGrey(const Image<uint8_t>& grey, double factor);

@@ -1,3 +1,5 @@
+#include <fmt/core.h>
+
 #include <CLI/CLI.hpp>
 #include <csignal>
 #include <exception>
@@ -43,6 +45,9 @@ int Run(int argc, char** argv) {
   sateen::cli::AddBenchSimulate(*bench, bench_simulate);
   sateen::cli::BenchCalibrateArgs bench_calibrate;
   sateen::cli::AddBenchCalibrate(*bench, bench_calibrate);
+  app.failure_message([](const CLI::App*, const CLI::Error& error) {
+    return fmt::format("sateen: error: {}\nRun with --help for more information.\n", error.what());
+  });
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
