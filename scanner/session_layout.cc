@@ -1,6 +1,7 @@
 #include "scanner/session_layout.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "core/sha256.h"
 
@@ -8,6 +9,9 @@ namespace sateen {
 namespace {
 
 namespace fs = std::filesystem;
+
+constexpr double kOtherLens = 0.1;       // of the focal length
+constexpr double kOtherPlaceMm = 150.0;  // no ruler is so wrong
 
 Status ReadRigInto(const fs::path& path, const std::optional<std::string>& recorded_sha256,
                    CapturePlan& plan) {
@@ -71,6 +75,44 @@ Status AssignFrames(const fs::path& dir, CapturePlan& plan) {
   return {};
 }
 
+// A calibrated rig differs from the one that the session was captured with by what a ruler is wrong
+// by; more than that is another rig.
+std::vector<std::string> DifferencesOf(const Rig& given, const Rig& own) {
+  std::vector<std::string> differences;
+  if (given.camera && own.camera && given.camera->model != own.camera->model) {
+    differences.push_back(fmt::format("its camera is '{}', the session's is '{}'",
+                                      given.camera->model, own.camera->model));
+  }
+  if (given.camera && own.camera && given.camera->size_px == own.camera->size_px &&
+      std::abs(given.camera->fx / own.camera->fx - 1.0) > kOtherLens) {
+    differences.push_back(fmt::format("its focal length is {:.0f} px, the session's is {:.0f} px",
+                                      given.camera->fx, own.camera->fx));
+  }
+  for (const Light& light : given.lights) {
+    const auto other = std::ranges::find(own.lights, light.name, &Light::name);
+    if (other != own.lights.end() && light.model != LightModel::kDistant &&
+        other->model != LightModel::kDistant &&
+        (light.position_mm - other->position_mm).norm() > kOtherPlaceMm) {
+      differences.push_back(fmt::format("its light '{}' is {:.0f} mm from the session's",
+                                        light.name,
+                                        (light.position_mm - other->position_mm).norm()));
+      break;  // one says it all
+    }
+  }
+  return differences;
+}
+
+void WarnOfOtherRig(const fs::path& dir, const fs::path& rig_file, CapturePlan& plan) {
+  const Result<Rig> own = ReadRig(dir / plan.session->rig);
+  if (!own) {
+    return;  // the one that is given stands in for it
+  }
+  for (const std::string& difference : DifferencesOf(plan.rig, *own)) {
+    plan.warnings.push_back(fmt::format("{}: {}; is it the rig that {} was captured with?",
+                                        rig_file.string(), difference, dir.string()));
+  }
+}
+
 }  // namespace
 
 Result<CapturePlan> PlanSessionRig(const fs::path& dir, const ReadCaptureOptions& options) {
@@ -102,6 +144,9 @@ Result<CapturePlan> PlanSession(const fs::path& dir, const ReadCaptureOptions& o
   }
   if (const Status status = AssignFrames(dir, *plan); !status) {
     return tl::unexpected(status.error());
+  }
+  if (options.rig_file) {
+    WarnOfOtherRig(dir, *options.rig_file, *plan);
   }
   if (plan->session->mask) {
     plan->mask = dir / *plan->session->mask;

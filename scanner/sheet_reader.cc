@@ -145,6 +145,7 @@ class SheetReader {
         plan_.session->table_from_sheet.value_or(Eigen::Isometry3d::Identity());
     sheet_.pose_is_recorded = plan_.session->table_from_sheet.has_value();
     sheet_.sha256_of_input = plan_.sha256_of_input;
+    sheet_.warnings = plan_.warnings;
     const Status status = ReadFrames()
                               .and_then([&] { return TakeBlocks(); })
                               .and_then([&] { return FindPoseByBorder(); })

@@ -10,6 +10,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
+using ::testing::ElementsAre;
 using testing::FailureOf;
 using testing::FourLightSession;
 using ::testing::HasSubstr;
@@ -152,6 +153,38 @@ TEST_F(SessionLayout, MatchesAnotherRigByTheNamesOfItsLights) {
   const Capture capture = MustRead({.rig_file = temp_.Path() / "new.json"});
   EXPECT_EQ(capture.rig.lights[0].name, "south");
   EXPECT_FLOAT_EQ(ValueOf(capture.stack[0]), 0.4F - 0.05F);
+}
+
+TEST_F(SessionLayout, WarnsOfARigThatIsNotTheSessions) {
+  Write(FourLightSession());
+  Rig own = testing::FourLights();
+  for (Light& light : own.lights) {
+    light.model = LightModel::kNear;
+    light.position_mm = {0, 0, 600};
+  }
+  own.camera = Camera{.model = "a", .size_px = {4, 3}, .fx = 10, .fy = 10};
+  own.camera->table_from_camera.translation().z() = 600;
+  own.camera->has_pose = true;
+  WriteText(temp_.Path() / "rig.json", RigToJson(own));
+  const auto warnings = [&](const Rig& rig) {
+    WriteText(temp_.Path() / "given.json", RigToJson(rig));
+    const auto plan = PlanSession(dir_, {.rig_file = temp_.Path() / "given.json"});
+    EXPECT_TRUE(plan) << plan.error().message;
+    return plan->warnings;
+  };
+  Rig given = own;
+  given.lights[2].position_mm.x() += 140.0;  // a rough rig
+  given.camera->fx *= 1.09;
+  EXPECT_THAT(warnings(given), SizeIs(0));
+  given.lights[2].position_mm.x() += 20.0;
+  EXPECT_THAT(warnings(given),
+              ElementsAre(HasSubstr("its light 'north' is 160 mm from the session's")));
+  given = own;
+  given.camera->fx *= 0.8;
+  given.camera->model = "b";
+  EXPECT_THAT(warnings(given),
+              ElementsAre(HasSubstr("its camera is 'b', the session's is 'a'"),
+                          HasSubstr("its focal length is 8 px, the session's is 10 px")));
 }
 
 TEST_F(SessionLayout, ReadsMaskAndTruth) {
