@@ -3,14 +3,22 @@
 # JOBS    parallel compilers and tests; all cores
 # PRESET  what build, demo and test use. "ci" stops on warnings, and knows those of g++ 12; with
 #         another compiler: make demo PRESET=release. Both build in build/release.
+# PORT    serial port of the LED board, for flash
+# BOOT_BAUD  of its bootloader: 57600 for a Nano with the old one
+# LIGHTS  of the firmware: 14, or 16 without flash sync and shutter
+# SECONDS  how long fuzz runs each target
 JOBS ?= $(shell nproc)
 PRESET ?= ci
+PORT ?= /dev/ttyACM0
+BOOT_BAUD ?= 115200
+LIGHTS ?= 14
+SECONDS ?= 60
 CTEST = ctest --output-on-failure --no-tests=error -j$(JOBS)
 # Tracked files and new ones that are not ignored.
 OUR_SOURCES = git ls-files -z --cached --others --exclude-standard '*.h' '*.cc' '*.c'
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo build test bench format format-check tidy asan tsan clean
+.PHONY: help setup demo build test bench firmware flash fuzz format format-check tidy asan tsan clean
 
 help:  ## This list
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 16
@@ -31,6 +39,23 @@ test: build  ## Build and run all tests
 bench: build  ## Speed against error of the whole solve, then the micro-benchmarks
 	@build/release/bin/sateen bench solve
 	@for program in build/release/bin/*_bench; do echo "== $$program"; $$program || exit 1; done
+
+firmware: setup  ## The LED board's firmware: build/firmware/sateen-controller.hex
+	@cmake -S firmware -B build/firmware --toolchain $(CURDIR)/firmware/avr.cmake -G Ninja --log-level=WARNING \
+	    -D SATEEN_LIGHTS=$(LIGHTS)
+	@cmake --build build/firmware
+
+flash: firmware  ## Upload it to an Arduino Uno or Nano: make flash PORT=/dev/ttyACM0
+	@avrdude -p atmega328p -c arduino -P $(PORT) -b $(BOOT_BAUD) -D \
+	    -U flash:w:build/firmware/sateen-controller.hex:i
+
+fuzz: setup  ## libFuzzer with the address sanitizer over each target of fuzz/
+	@cmake --preset fuzz --log-level=WARNING
+	@cmake --build --preset fuzz -j$(JOBS)
+	@for target in build/fuzz/bin/sateen_fuzz_*; do name=$${target##*sateen_fuzz_}; \
+	    mkdir -p build/fuzz/found/$$name; echo "== $$name"; \
+	    $$target -max_total_time=$(SECONDS) -max_len=400 -print_final_stats=1 \
+	        build/fuzz/found/$$name fuzz/corpus/$$name || exit 1; done
 
 format: setup  ## Format all sources in place
 	@$(OUR_SOURCES) | xargs -0r clang-format -i
