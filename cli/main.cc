@@ -11,6 +11,8 @@
 #include "cli/bench_solve.h"
 #include "cli/board.h"
 #include "cli/calibrate.h"
+#include "cli/devices.h"
+#include "cli/light.h"
 #include "cli/simulate.h"
 #include "cli/solve.h"
 #include "core/interrupt.h"
@@ -37,6 +39,10 @@ int Run(int argc, char** argv) {
   sateen::cli::AddCalibrate(app, calibrate);
   sateen::cli::BoardPrintArgs board_print;
   sateen::cli::AddBoard(app, board_print);
+  sateen::cli::LightArgs light;
+  sateen::cli::AddLight(app, light);
+  sateen::cli::DevicesArgs devices;
+  sateen::cli::AddDevices(app, devices);
   CLI::App* bench = app.add_subcommand("bench", "Measure speed against error on this machine");
   bench->require_subcommand(1);
   sateen::cli::BenchSolveArgs bench_solve;
@@ -66,6 +72,10 @@ int Run(int argc, char** argv) {
     status = RunCalibrate(app, calibrate, task, std::cout, std::cerr);
   } else if (app.got_subcommand("board")) {
     status = RunBoardPrint(board_print, task, std::cout, std::cerr);
+  } else if (app.got_subcommand("light")) {
+    status = RunLight(light, task, std::cout, std::cerr);
+  } else if (app.got_subcommand("devices")) {
+    status = RunDevices(devices, task, std::cout, std::cerr);
   } else if (bench->got_subcommand("simulate")) {
     status = RunBenchSimulate(bench_simulate, task, std::cout, std::cerr);
   } else if (bench->got_subcommand("calibrate")) {

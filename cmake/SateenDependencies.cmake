@@ -39,6 +39,7 @@ sateen_find_pkg_config(LibRaw libraw_r)
 sateen_find_pkg_config(LibTiff libtiff-4>=4.5)
 sateen_find_pkg_config(matio matio)
 sateen_find_pkg_config(Cairo cairo-pdf>=1.16)
+sateen_find_pkg_config(libserialport libserialport>=0.1.1)
 # Not by its CMake package: Debian's stops unless the image viewer, and with it Qt, is installed.
 sateen_find_pkg_config(OpenImageIO OpenImageIO>=2.4)
 if(NOT TARGET OpenImageIO::OpenImageIO)

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <filesystem>
+#include <iosfwd>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "core/task.h"
+#include "scanner/byte_port.h"
+
+namespace sateen::cli {
+
+struct LightArgs {
+  std::string what;           // a channel, a light's name, "off", "status" or "limits"
+  std::string target;         // of limits: a channel or a name; empty: all
+  std::string port;           // empty: the one that looks like the LED board
+  std::filesystem::path rig;  // where names are looked up
+  std::string level = "50%";
+  std::string on_time;  // empty: until Ctrl-C, or the light's limit
+  bool clear_fault = false;
+  bool json = false;
+  // Of limits; empty: as it is.
+  std::string max_level;
+  std::string max_on;
+  int max_lit = 0;   // 0: as it is
+  std::string dim;   // "16kHz", "2kHz", "250Hz"
+  std::string sync;  // "falling", "rising"
+};
+
+void AddLight(CLI::App& root, LightArgs& args);
+
+// Returns the exit status. The first opens the port that args name; tests give another.
+int RunLight(const LightArgs& args, const Task& task, std::ostream& out, std::ostream& log);
+int RunLightOn(const LightArgs& args, std::unique_ptr<BytePort> port, const Task& task,
+               std::ostream& out, std::ostream& log);
+
+}  // namespace sateen::cli

@@ -1,0 +1,62 @@
+#include "cli/quantity.h"
+
+#include <charconv>
+#include <cmath>
+#include <optional>
+
+namespace sateen::cli {
+namespace {
+
+struct Quantity {
+  double value = 0.0;
+  std::string_view unit;
+};
+
+// A plain decimal number and what follows it.
+std::optional<Quantity> Split(std::string_view text) {
+  Quantity quantity;
+  const char* end = text.data() + text.size();
+  const auto [rest, error] =
+      std::from_chars(text.data(), end, quantity.value, std::chars_format::fixed);
+  if (error != std::errc() || !std::isfinite(quantity.value)) {
+    return std::nullopt;
+  }
+  quantity.unit = std::string_view(rest, static_cast<std::size_t>(end - rest));
+  return quantity;
+}
+
+}  // namespace
+
+Result<double> ParseLevel(std::string_view text) {
+  const std::optional<Quantity> quantity = Split(text);
+  if (quantity && (quantity->unit == "%" || quantity->unit.empty())) {
+    const double level = quantity->unit.empty() ? quantity->value : quantity->value / 100.0;
+    if (level >= 0.0 && level <= 1.0) {
+      return level;
+    }
+  }
+  return Fail(ErrorCode::kInvalidArgument, "level '{}'; needs 0% to 100%, or 0 to 1", text);
+}
+
+Result<std::chrono::milliseconds> ParseDuration(std::string_view text) {
+  const std::optional<Quantity> quantity = Split(text);
+  if (quantity && (quantity->unit == "ms" || quantity->unit == "s")) {
+    const double ms = std::round(quantity->value * (quantity->unit == "s" ? 1000.0 : 1.0));
+    if (ms >= 1.0 && ms <= 3600e3) {
+      return std::chrono::milliseconds(static_cast<std::int64_t>(ms));
+    }
+  }
+  return Fail(ErrorCode::kInvalidArgument,
+              "time '{}'; needs a number with its unit, as 500ms or 2s, from 1ms to 3600s", text);
+}
+
+std::string DurationText(std::chrono::milliseconds time) {
+  if (time < std::chrono::seconds(1)) {
+    return fmt::format("{} ms", time.count());
+  }
+  return fmt::format("{:.6g} s", static_cast<double>(time.count()) / 1000.0);
+}
+
+std::string LevelText(double level) { return fmt::format("{:.4g} %", 100.0 * level); }
+
+}  // namespace sateen::cli

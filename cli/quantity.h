@@ -1,0 +1,23 @@
+#pragma once
+
+#include <chrono>
+#include <string>
+#include <string_view>
+
+#include "core/error.h"
+
+namespace sateen::cli {
+
+// "50%" or "0.5" as 0.5. kInvalidArgument: anything else, or not in 0 to 1.
+[[nodiscard]] Result<double> ParseLevel(std::string_view text);
+
+// "500ms", "2s" or "1.5s", to the millisecond. kInvalidArgument: anything else, or not in 1 ms to one
+// hour.
+[[nodiscard]] Result<std::chrono::milliseconds> ParseDuration(std::string_view text);
+
+// "500 ms" below a second, else "2 s" or "1.25 s".
+[[nodiscard]] std::string DurationText(std::chrono::milliseconds time);
+// "50 %" or "12.5 %".
+[[nodiscard]] std::string LevelText(double level);
+
+}  // namespace sateen::cli
