@@ -70,7 +70,7 @@ tidy: setup  ## clang-tidy over the libraries and the program
 asan: setup  ## All tests under the address and undefined-behaviour sanitizers
 	@cmake --preset asan --log-level=WARNING
 	@cmake --build --preset asan -j$(JOBS)
-	@UBSAN_OPTIONS=print_stacktrace=1 LSAN_OPTIONS="suppressions=$(CURDIR)/tests/lsan.supp" \
+	@UBSAN_OPTIONS=print_stacktrace=1 LSAN_OPTIONS="suppressions=$(CURDIR)/tests/lsan.supp:print_suppressions=0" \
 	    $(CTEST) --test-dir build/asan
 
 # By hand and not in CI: the system's oneTBB and OpenImageIO are not instrumented, and some runs

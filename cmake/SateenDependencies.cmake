@@ -50,3 +50,13 @@ endif()
 if(NOT "${CMAKE_FIND_PACKAGE_NAME}" STREQUAL "sateen")
   find_package(CLI11 2.1 REQUIRED)
 endif()
+
+# For the virtual rig alone, because it is GPL-3. Not by pkg-config: Debian's file wants libelf-dev.
+if(SATEEN_BUILD_VIRTUAL_RIG AND NOT "${CMAKE_FIND_PACKAGE_NAME}" STREQUAL "sateen")
+  find_path(SATEEN_SIMAVR_INCLUDE_DIR simavr/sim_avr.h REQUIRED)
+  find_library(SATEEN_SIMAVR_LIBRARY simavr REQUIRED)
+  add_library(simavr::simavr UNKNOWN IMPORTED)
+  set_target_properties(simavr::simavr PROPERTIES
+    IMPORTED_LOCATION ${SATEEN_SIMAVR_LIBRARY}
+    INTERFACE_INCLUDE_DIRECTORIES ${SATEEN_SIMAVR_INCLUDE_DIR})
+endif()

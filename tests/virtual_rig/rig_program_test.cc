@@ -1,0 +1,241 @@
+#include <fcntl.h>
+#include <gmock/gmock.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <array>
+#include <chrono>
+#include <cstdio>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "tests/testing/files.h"
+
+// The programs as people start them: sateen-virtual-rig with the firmware, and under it sateen with
+// libserialport. These run in real time; nothing here depends on how fast the machine is.
+namespace sateen::testing {
+namespace {
+
+using nlohmann::json;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+const std::string kRig = SATEEN_PROGRAM_DIR "/sateen-virtual-rig";
+const std::string kSateen = SATEEN_PROGRAM_DIR "/sateen";
+const std::string kRing = SATEEN_SOURCE_DIR "/samples/rigs/ring10.json";
+
+struct ShellResult {
+  int exit_status = -1;
+  std::string out;  // and what went to standard error
+};
+
+std::FILE* StartShell(const std::string& command) {
+  return popen(("exec 2>&1; " + command).c_str(), "r");
+}
+
+// Reads to the end, so that the command does not find its pipe closed.
+ShellResult EndShell(std::FILE* pipe) {
+  ShellResult result;
+  std::array<char, 4096> bytes = {};
+  for (size_t count = 0; (count = std::fread(bytes.data(), 1, bytes.size(), pipe)) > 0;) {
+    result.out.append(bytes.data(), count);
+  }
+  const int status = pclose(pipe);
+  result.exit_status = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+  return result;
+}
+
+std::vector<json> Events(const std::filesystem::path& path) {
+  std::ifstream file(path);
+  std::vector<json> events;
+  for (std::string line; std::getline(file, line) && !file.eof();) {
+    events.push_back(json::parse(line));
+  }
+  return events;
+}
+
+// The changes of the lights, as "led-3 0.5".
+std::vector<std::string> LightEvents(const std::filesystem::path& path) {
+  std::vector<std::string> lights;
+  for (const json& event : Events(path)) {
+    if (event["event"] == "light") {
+      lights.push_back(event["name"].get<std::string>() + " " + event["level"].dump());
+    }
+  }
+  return lights;
+}
+
+ShellResult Shell(const std::string& command) { return EndShell(StartShell(command)); }
+
+TEST(RigProgram, SateenFindsTheVirtualBoardByItsUsbId) {
+  const ShellResult result = Shell(kRig + " run -- " + kSateen + " devices --json");
+
+  ASSERT_EQ(result.exit_status, 0) << result.out;
+  const json devices = json::parse(result.out);
+  const json& ports = devices.contains("devices") ? devices["devices"] : devices["ports"];
+  ASSERT_EQ(ports.size(), 1U) << result.out;
+  EXPECT_EQ(ports[0]["port"], "/dev/ttyACM0");
+  EXPECT_EQ(ports[0]["usb"], "2341:0043");
+  EXPECT_EQ(ports[0]["kind"], "led-board");
+  EXPECT_EQ(ports[0]["lights"], 14);
+}
+
+TEST(RigProgram, ALightShinesAtTheLevelAndGoesOff) {
+  const TempFolder folder;
+  const std::filesystem::path events = folder.Path() / "events.jsonl";
+
+  const ShellResult result = Shell(kRig + " run --rig " + kRing + " --events " + events.string() +
+                                   " -- " + kSateen + " light 3 --level 50% --for 300ms");
+
+  EXPECT_EQ(result.exit_status, 0) << result.out;
+  EXPECT_THAT(LightEvents(events), ::testing::ElementsAre("led-3 0.5", "led-3 0"));
+  EXPECT_EQ(Events(events).front()["event"], "start");
+  EXPECT_EQ(Events(events).back()["event"], "end");
+}
+
+TEST(RigProgram, StatusAndOffWork) {
+  const ShellResult result =
+      Shell(kRig + " run -- sh -c '" + kSateen + " light off && " + kSateen + " light status'");
+  EXPECT_EQ(result.exit_status, 0) << result.out;
+  EXPECT_THAT(result.out, HasSubstr("all lights off"));
+  EXPECT_THAT(result.out, HasSubstr("/dev/ttyACM0"));
+}
+
+TEST(RigProgram, AnUnoThatResetsWhenItIsOpenedWorksToo) {
+  const ShellResult result =
+      Shell(kRig + " run --opening-resets -- " + kSateen + " light 0 --for 50ms");
+  EXPECT_EQ(result.exit_status, 0) << result.out;
+}
+
+TEST(RigProgram, RunEndsWithTheStatusOfItsCommand) {
+  EXPECT_EQ(Shell(kRig + " run -- sh -c 'exit 37'").exit_status, 37);
+  EXPECT_EQ(Shell(kRig + " run -- sh -c 'kill -9 $$'").exit_status, 128 + 9);
+  const ShellResult missing = Shell(kRig + " run -- /nowhere/at-all");
+  EXPECT_EQ(missing.exit_status, 2);
+  EXPECT_THAT(missing.out, HasSubstr("'/nowhere/at-all' cannot be started"));
+}
+
+TEST(RigProgram, SaysWhatIsWrongWithItsInputs) {
+  const TempFolder folder;
+  const ShellResult no_firmware = Shell(kRig + " run --firmware /nowhere.hex -- true");
+  EXPECT_EQ(no_firmware.exit_status, 4);
+  EXPECT_THAT(no_firmware.out, HasSubstr("/nowhere.hex"));
+
+  WriteText(folder.Path() / "no.hex", "hello\n");
+  const ShellResult bad =
+      Shell(kRig + " run --firmware " + (folder.Path() / "no.hex").string() + " -- true");
+  EXPECT_EQ(bad.exit_status, 3);
+  EXPECT_THAT(bad.out, HasSubstr("line 1 is no Intel HEX record"));
+
+  json ring = json::parse(std::ifstream(kRing));
+  ring["lights"][9]["channel"] = 14;
+  WriteText(folder.Path() / "rig.json", ring.dump());
+  const ShellResult rig =
+      Shell(kRig + " run --rig " + (folder.Path() / "rig.json").string() + " -- true");
+  EXPECT_EQ(rig.exit_status, 3);
+  EXPECT_THAT(rig.out, HasSubstr("'led-9' is on channel 14; the board has channels 0 to 13"));
+
+  EXPECT_EQ(Shell(kRig + " --no-such-option").exit_status, 2);
+}
+
+// A rig that runs by itself, told what to do by lines on its standard input.
+class RunningRig {
+ public:
+  explicit RunningRig(const std::filesystem::path& folder) : events_(folder / "events.jsonl") {
+    const std::string command = "exec '" + kRig + "' --rig '" + kRing + "' --events '" +
+                                events_.string() + "' --port-link '" + (folder / "port").string() +
+                                "' 2>'" + (folder / "log").string() + "'";
+    input_ = popen(command.c_str(), "w");
+    start_ = WaitFor("start");
+  }
+  RunningRig(const RunningRig&) = delete;
+  RunningRig& operator=(const RunningRig&) = delete;
+  ~RunningRig() {
+    Tell("quit");
+    EXPECT_EQ(pclose(input_), 0);
+  }
+
+  void Tell(const std::string& line) {
+    std::fputs((line + "\n").c_str(), input_);
+    std::fflush(input_);
+  }
+
+  // The `number`th such event; waits for it, but not for ever.
+  json WaitFor(const std::string& what, int number = 1) {
+    for (int i = 0; i < 3000; ++i) {
+      int seen = 0;
+      for (const json& event : Events(events_)) {
+        if (event["event"] == what && ++seen == number) {
+          return event;
+        }
+      }
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    }
+    ADD_FAILURE() << "no event '" << what << "'";
+    return {};
+  }
+
+  // Before a command that shall find the board.
+  [[nodiscard]] std::string Environment() const {
+    return "LD_PRELOAD='" + start_["environment"]["LD_PRELOAD"].get<std::string>() +
+           "' SATEEN_VIRTUAL_PORT='" +
+           start_["environment"]["SATEEN_VIRTUAL_PORT"].get<std::string>() + "' ";
+  }
+
+ private:
+  std::filesystem::path events_;
+  std::FILE* input_ = nullptr;
+  json start_;
+};
+
+TEST(RigProgram, UnpluggingEndsALightAndTheBoardIsFoundAgain) {
+  const TempFolder folder;
+  RunningRig rig(folder.Path());
+  EXPECT_TRUE(std::filesystem::is_symlink(folder.Path() / "port"));
+  std::FILE* light = StartShell(rig.Environment() + kSateen + " light 5");
+  EXPECT_EQ(rig.WaitFor("light")["name"], "led-5");
+
+  rig.Tell("unplug");
+  rig.WaitFor("unplug");
+  EXPECT_EQ(rig.WaitFor("light", 2)["level"], 0.0);
+  EXPECT_FALSE(std::filesystem::is_symlink(folder.Path() / "port"));
+  const ShellResult lost = EndShell(light);
+  EXPECT_EQ(lost.exit_status, 5) << lost.out;
+  const ShellResult gone = Shell(rig.Environment() + kSateen + " light status");
+  EXPECT_EQ(gone.exit_status, 5) << gone.out;
+
+  rig.Tell("plug");
+  rig.WaitFor("plug");
+  const ShellResult back = Shell(rig.Environment() + kSateen + " light status");
+  EXPECT_EQ(back.exit_status, 0) << back.out;
+}
+
+TEST(RigProgram, AKilledHostLeavesNoLightOn) {
+  const TempFolder folder;
+  RunningRig rig(folder.Path());
+  const ShellResult killed =
+      Shell(rig.Environment() + "sh -c '" + kSateen + " light 5 & while ! grep -q \"level.:0.5\" " +
+            (folder.Path() / "events.jsonl").string() + "; do sleep 0.05; done; kill -9 $!'");
+  EXPECT_EQ(killed.exit_status, 0) << killed.out;
+  const json off = rig.WaitFor("light", 2);
+  EXPECT_EQ(off["level"], 0.0);
+  EXPECT_LT(off["time_s"].get<double>() - rig.WaitFor("light")["time_s"].get<double>(), 10.0);
+}
+
+TEST(RigProgram, CommandsActOnTheBoard) {
+  const TempFolder folder;
+  RunningRig rig(folder.Path());
+  rig.Tell("reset");
+  EXPECT_EQ(rig.WaitFor("reset")["cause"], "external");
+  rig.Tell("brown-out 30");
+  EXPECT_EQ(rig.WaitFor("reset", 2)["cause"], "brown-out");
+  const ShellResult status = Shell(rig.Environment() + kSateen + " light status");
+  EXPECT_EQ(status.exit_status, 0) << status.out;
+  EXPECT_THAT(status.out, HasSubstr("supply voltage"));
+}
+
+}  // namespace
+}  // namespace sateen::testing
