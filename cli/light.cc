@@ -50,6 +50,16 @@ Result<int> FindChannel(const std::string& text, const std::filesystem::path& ri
              : Fail(ErrorCode::kInvalidArgument, "{} has no light '{}'", rig_file.string(), text);
 }
 
+// The channel that the command line names, if it names one.
+Result<std::optional<int>> NamedChannel(const LightArgs& args) {
+  const bool limits = args.what == "limits";
+  if (limits ? args.target.empty() : args.what == "status" || args.what == "off") {
+    return std::optional<int>();
+  }
+  const Result<int> channel = FindChannel(limits ? args.target : args.what, args.rig);
+  return channel ? Result<std::optional<int>>(*channel) : tl::unexpected(channel.error());
+}
+
 // What the light did until it went off, by itself or by Ctrl-C.
 struct Lit {
   bool cancelled = false;
@@ -81,14 +91,14 @@ Result<Lit> StayUntilOff(LightBoard& board, int channel, const Task& task) {
   }
 }
 
-Status TurnOn(const LightArgs& args, LightBoard& board, const Task& task, std::ostream& out) {
-  const Result<int> channel = FindChannel(args.what, args.rig);
+Status TurnOn(const LightArgs& args, int channel, LightBoard& board, const Task& task,
+              std::ostream& out) {
   const Result<double> level = ParseLevel(args.level);
-  if (!channel || !level) {
-    return tl::unexpected(!channel ? channel.error() : level.error());
+  if (!level) {
+    return tl::unexpected(level.error());
   }
-  const auto index = static_cast<std::size_t>(*channel);
-  milliseconds on_time = *channel >= 0 && index < board.Info().lights.size()
+  const auto index = static_cast<std::size_t>(channel);
+  milliseconds on_time = channel >= 0 && index < board.Info().lights.size()
                              ? board.Info().lights[index].max_on
                              : milliseconds(1);
   if (!args.on_time.empty()) {
@@ -98,7 +108,7 @@ Status TurnOn(const LightArgs& args, LightBoard& board, const Task& task, std::o
     }
     on_time = *asked;
   }
-  const Result<BoardState> on = board.SetLight(*channel, *level, on_time);
+  const Result<BoardState> on = board.SetLight(channel, *level, on_time);
   if (!on) {
     return tl::unexpected(on.error());
   }
@@ -109,7 +119,7 @@ Status TurnOn(const LightArgs& args, LightBoard& board, const Task& task, std::o
   out << fmt::format("light {} on at {} for {}{}\n", args.what, LevelText(on->level),
                      args.on_time.empty() ? "at most " : "", DurationText(on_time))
       << std::flush;
-  const Result<Lit> lit = StayUntilOff(board, *channel, task);
+  const Result<Lit> lit = StayUntilOff(board, channel, task);
   if (!lit) {
     return tl::unexpected(lit.error());
   }
@@ -144,7 +154,7 @@ Status ShowStatus(const LightArgs& args, LightBoard& board, std::ostream& out) {
   return {};
 }
 
-Status SetLimits(const LightArgs& args, LightBoard& board) {
+Status SetLimits(const LightArgs& args, std::optional<int> named, LightBoard& board) {
   std::optional<double> max_level;
   std::optional<milliseconds> max_on;
   if (!args.max_level.empty()) {
@@ -164,15 +174,8 @@ Status SetLimits(const LightArgs& args, LightBoard& board) {
   if (!max_level && !max_on) {
     return {};
   }
-  int first = 0;
-  int last = static_cast<int>(board.Info().lights.size()) - 1;
-  if (!args.target.empty()) {
-    const Result<int> channel = FindChannel(args.target, args.rig);
-    if (!channel) {
-      return tl::unexpected(channel.error());
-    }
-    first = last = *channel;
-  }
+  const int first = named.value_or(0);
+  const int last = named.value_or(static_cast<int>(board.Info().lights.size()) - 1);
   for (int channel = first; channel <= last; ++channel) {
     const auto index = static_cast<std::size_t>(channel);
     const LightLimits old = channel >= 0 && index < board.Info().lights.size()
@@ -209,6 +212,11 @@ Status Configure(const LightArgs& args, LightBoard& board) {
 }
 
 Status Run(const LightArgs& args, LightBoard& board, const Task& task, std::ostream& out) {
+  // Before the port is opened, which restarts an Uno.
+  const Result<std::optional<int>> channel = NamedChannel(args);
+  if (!channel) {
+    return tl::unexpected(channel.error());
+  }
   if (Status connected = board.Connect(); !connected) {
     return connected;
   }
@@ -216,7 +224,7 @@ Status Run(const LightArgs& args, LightBoard& board, const Task& task, std::ostr
     return ShowStatus(args, board, out);
   }
   if (args.what == "limits") {
-    Status set = SetLimits(args, board);
+    Status set = SetLimits(args, *channel, board);
     if (set) {
       set = Configure(args, board);
     }
@@ -233,7 +241,7 @@ Status Run(const LightArgs& args, LightBoard& board, const Task& task, std::ostr
     out << "all lights off\n";
     return {};
   }
-  return TurnOn(args, board, task, out);
+  return TurnOn(args, **channel, board, task, out);
 }
 
 }  // namespace
@@ -241,7 +249,7 @@ Status Run(const LightArgs& args, LightBoard& board, const Task& task, std::ostr
 void AddLight(CLI::App& root, LightArgs& args) {
   CLI::App* cmd = root.add_subcommand(
       "light", "Turn a light of the LED board on or off, show its state, set its limits");
-  cmd->add_option("what", args.what,
+  cmd->add_option("light", args.what,
                   "Number or name of a light: turns it on until Ctrl-C, the time of --for or its "
                   "limit; 'off': all lights; 'status'; 'limits'")
       ->required();

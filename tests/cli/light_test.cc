@@ -72,10 +72,13 @@ TEST(Light, IsFoundByItsNameInTheRig) {
   const std::string rig = std::string(SATEEN_SOURCE_DIR) + "/samples/rigs/ring10.json";
   EXPECT_EQ(Light(fake, {"led-4", "--rig", rig, "--for", "1s"}).exit_status, 0);
   EXPECT_EQ(fake.lights_set.at(0).channel, 4);
-  const RunResult unknown = Light(fake, {"led-44", "--rig", rig});
+  FakeBoard untouched;  // an Uno restarts when its port is opened
+  const RunResult unknown = Light(untouched, {"led-44", "--rig", rig});
   EXPECT_EQ(unknown.exit_status, 2);
   EXPECT_THAT(unknown.log, HasSubstr("has no light 'led-44'"));
-  EXPECT_THAT(Light(fake, {"led-4"}).log, HasSubstr("--rig"));
+  EXPECT_THAT(Light(untouched, {"led-4"}).log, HasSubstr("--rig"));
+  EXPECT_THAT(Light(untouched, {"limits", "off", "--max-on", "1s"}).log, HasSubstr("--rig"));
+  EXPECT_EQ(untouched.opened, 0);
 }
 
 TEST(Light, WrongCommandLinesTouchNoPort) {
