@@ -5,13 +5,15 @@
 #         another compiler: make demo PRESET=release. Both build in build/release.
 # PORT    serial port of the LED board, for flash
 # BOOT_BAUD  of its bootloader: 57600 for a Nano with the old one
-# LIGHTS  of the firmware: 14, or 16 without flash sync and shutter
+# LIGHTS  of the firmware that flash uploads: 14, or 16 without flash sync and shutter
 # SECONDS  how long fuzz runs each target
 JOBS ?= $(shell nproc)
 PRESET ?= ci
 PORT ?= /dev/ttyACM0
 BOOT_BAUD ?= 115200
 LIGHTS ?= 14
+IMAGE_14 = sateen-controller.hex
+IMAGE_16 = sateen-controller-16.hex
 SECONDS ?= 60
 CTEST = ctest --output-on-failure --no-tests=error -j$(JOBS)
 # Tracked files and new ones that are not ignored.
@@ -40,14 +42,14 @@ bench: build  ## Speed against error of the whole solve, then the micro-benchmar
 	@build/release/bin/sateen bench solve
 	@for program in build/release/bin/*_bench; do echo "== $$program"; $$program || exit 1; done
 
-firmware: setup  ## The LED board's firmware: build/firmware/sateen-controller.hex
-	@cmake -S firmware -B build/firmware --toolchain $(CURDIR)/firmware/avr.cmake -G Ninja --log-level=WARNING \
-	    -D SATEEN_LIGHTS=$(LIGHTS)
+firmware: setup  ## The LED board's firmware: build/firmware/sateen-controller.hex, -16.hex
+	@cmake -S firmware -B build/firmware --toolchain $(CURDIR)/firmware/avr.cmake -G Ninja --log-level=WARNING
 	@cmake --build build/firmware
 
 flash: firmware  ## Upload it to an Arduino Uno or Nano: make flash PORT=/dev/ttyACM0
+	@test -n '$(IMAGE_$(LIGHTS))' || { echo 'LIGHTS=$(LIGHTS): 14 or 16' >&2; exit 2; }
 	@avrdude -p atmega328p -c arduino -P $(PORT) -b $(BOOT_BAUD) -D \
-	    -U flash:w:build/firmware/sateen-controller.hex:i
+	    -U flash:w:build/firmware/$(IMAGE_$(LIGHTS)):i
 
 fuzz: setup  ## libFuzzer with the address sanitizer over each target of fuzz/
 	@cmake --preset fuzz --log-level=WARNING

@@ -1,10 +1,12 @@
-# Prints flash and static RAM of a firmware and fails where they are above their limits [bytes].
+# Prints flash and static RAM of a firmware, unless quiet, and fails where they are above their limits [bytes].
 execute_process(COMMAND avr-size ${elf} OUTPUT_VARIABLE table COMMAND_ERROR_IS_FATAL ANY)
 string(REGEX MATCH "\n *([0-9]+)[ \t]+([0-9]+)[ \t]+([0-9]+)" ignored "${table}")
 math(EXPR flash "${CMAKE_MATCH_1} + ${CMAKE_MATCH_2}")
 math(EXPR ram "${CMAKE_MATCH_2} + ${CMAKE_MATCH_3}")
-message("${elf}: flash ${flash} of ${flash_limit} bytes, static RAM ${ram} of ${ram_limit} bytes")
+if(NOT quiet)
+  message("${elf}: flash ${flash} of ${flash_limit} bytes, static RAM ${ram} of ${ram_limit} bytes")
+endif()
 if(flash GREATER flash_limit OR ram GREATER ram_limit)
   file(REMOVE ${elf})
-  message(FATAL_ERROR "${elf}: too large")
+  message(FATAL_ERROR "${elf}: flash ${flash} of ${flash_limit} bytes, static RAM ${ram} of ${ram_limit} bytes")
 endif()

@@ -14,29 +14,28 @@
 #error "SATEEN_LIGHTS is 14 or 16"
 #endif
 
-#if SATEEN_LIGHTS == 16
-#define SATEEN_MORE_LIGHT_PINS(X) X(14, C, 5, "A5") X(15, D, 2, "D2")
-#else
-#define SATEEN_MORE_LIGHT_PINS(X)
-#endif
-
 /* X(channel, port, bit, what an Arduino calls it) */
-#define SATEEN_LIGHT_PINS(X) \
-  X(0, D, 3, "D3")           \
-  X(1, D, 4, "D4")           \
-  X(2, D, 5, "D5")           \
-  X(3, D, 6, "D6")           \
-  X(4, D, 7, "D7")           \
-  X(5, B, 0, "D8")           \
-  X(6, B, 2, "D10")          \
-  X(7, B, 3, "D11")          \
-  X(8, B, 4, "D12")          \
-  X(9, C, 0, "A0")           \
-  X(10, C, 1, "A1")          \
-  X(11, C, 2, "A2")          \
-  X(12, C, 3, "A3")          \
-  X(13, C, 4, "A4")          \
-  SATEEN_MORE_LIGHT_PINS(X)
+#define SATEEN_LIGHT_PINS_14(X) \
+  X(0, D, 3, "D3")              \
+  X(1, D, 4, "D4")              \
+  X(2, D, 5, "D5")              \
+  X(3, D, 6, "D6")              \
+  X(4, D, 7, "D7")              \
+  X(5, B, 0, "D8")              \
+  X(6, B, 2, "D10")             \
+  X(7, B, 3, "D11")             \
+  X(8, B, 4, "D12")             \
+  X(9, C, 0, "A0")              \
+  X(10, C, 1, "A1")             \
+  X(11, C, 2, "A2")             \
+  X(12, C, 3, "A3")             \
+  X(13, C, 4, "A4")
+#define SATEEN_LIGHT_PINS_16(X) SATEEN_LIGHT_PINS_14(X) X(14, C, 5, "A5") X(15, D, 2, "D2")
+#if SATEEN_LIGHTS == 16
+#define SATEEN_LIGHT_PINS SATEEN_LIGHT_PINS_16
+#else
+#define SATEEN_LIGHT_PINS SATEEN_LIGHT_PINS_14
+#endif
 
 #define SATEEN_CHANNELS SATEEN_LIGHTS
 

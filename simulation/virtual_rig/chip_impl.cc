@@ -38,6 +38,8 @@ void Chip::Impl::OnReset(avr_t* avr) {
     chip->reset_of_model(avr);
   }
   chip->line_busy = false;  // its timer is gone with all others
+  const auto flag = static_cast<uint8_t>(chip->cause);
+  chip->mcusr = chip->cause == ResetCause::kPowerOn ? flag : chip->mcusr | flag;
   chip->ReleaseOutputs();
   avr_cycle_timer_register(avr, 1, &OnStart, chip);
   if (chip->events.reset) {
@@ -53,9 +55,10 @@ avr_cycle_count_t Chip::Impl::OnStart(avr_t* avr, avr_cycle_count_t /*when*/, vo
   avr_extint_set_strict_lvl_trig(avr, 1, 0);
   auto* self = static_cast<Impl*>(chip);
   if (self->boot_loader != BootLoader::kNone) {
-    avr->data[kR2] = self->boot_loader == BootLoader::kTellsInR2 ? avr->data[kMcusr] : 0;
-    avr->data[kMcusr] = 0;
+    avr->data[kR2] = self->boot_loader == BootLoader::kTellsInR2 ? self->mcusr : 0;
+    self->mcusr = 0;
   }
+  avr->data[kMcusr] = self->mcusr;
   self->ApplyInputs();
   return 0;
 }
@@ -74,6 +77,12 @@ void Chip::Impl::OnDirectionWrite(avr_irq_t* /*irq*/, uint32_t value, void* port
 
 void Chip::Impl::OnTimerWrite(avr_irq_t* /*irq*/, uint32_t /*value*/, void* chip) {
   static_cast<Impl*>(chip)->OutputsChanged();
+}
+
+// Flags are cleared by writing 0 to them, and set by resets alone.
+void Chip::Impl::OnMcusrWrite(avr_irq_t* /*irq*/, uint32_t value, void* chip) {
+  auto* self = static_cast<Impl*>(chip);
+  self->mcusr &= static_cast<uint8_t>(value);
 }
 
 void Chip::Impl::OnSent(avr_irq_t* /*irq*/, uint32_t value, void* chip) {
@@ -106,6 +115,8 @@ void Chip::Impl::Connect() {
   uart->flags = 0;  // neither print what is sent nor sleep while it polls
   receiver = avr_io_getirq(avr, AVR_IOCTL_UART_GETIRQ('0'), UART_IRQ_INPUT);
   avr_irq_register_notify(avr_io_getirq(avr, AVR_IOCTL_UART_GETIRQ('0'), UART_IRQ_OUTPUT), &OnSent,
+                          this);
+  avr_irq_register_notify(avr_iomem_getirq(avr, kMcusr, nullptr, AVR_IOMEM_IRQ_ALL), &OnMcusrWrite,
                           this);
   for (size_t i = 0; i < kChipPorts.size(); ++i) {
     ports[i].chip = this;
@@ -154,7 +165,6 @@ void Chip::Impl::Reset(ResetCause why) {
   cause = why;
   avr_reset(avr);
   cause = ResetCause::kWatchdog;
-  avr->data[kMcusr] = static_cast<uint8_t>(why);
 }
 
 // Starts the next byte, if there is one and the line is free. libsimavr hands bytes to the firmware

@@ -43,6 +43,8 @@ struct Chip::Impl {
   };
   std::optional<Start> held_until;
   BootLoader boot_loader = BootLoader::kNone;
+  // Causes of the resets so far that the firmware has not cleared.
+  uint8_t mcusr = 0;
   // What the reset that is going on is called; the watchdog's come by themselves.
   ResetCause cause = ResetCause::kWatchdog;
   std::array<Port, kChipPorts.size()> ports = {};
@@ -64,6 +66,7 @@ struct Chip::Impl {
   static void OnPortWrite(avr_irq_t* irq, uint32_t value, void* port);
   static void OnDirectionWrite(avr_irq_t* irq, uint32_t value, void* port);
   static void OnTimerWrite(avr_irq_t* irq, uint32_t value, void* chip);
+  static void OnMcusrWrite(avr_irq_t* irq, uint32_t value, void* chip);
   static void OnSent(avr_irq_t* irq, uint32_t value, void* chip);
   static avr_cycle_count_t OnByteTime(avr_t* avr, avr_cycle_count_t when, void* chip);
   static avr_cycle_count_t OnStop(avr_t* /*avr*/, avr_cycle_count_t /*when*/, void* /*chip*/) {

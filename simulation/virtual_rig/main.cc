@@ -32,7 +32,8 @@ using sateen::Status;
 
 struct Args {
   std::string rig;
-  std::string firmware;
+  std::string firmware;  // empty: ours for as many lights
+  int lights = 14;
   std::string port_link;
   std::string events;
   bool opening_resets = false;
@@ -40,15 +41,15 @@ struct Args {
 };
 
 // Beside this program, where the build and `make install` put what belongs to it.
-fs::path FindBeside(std::initializer_list<const char*> candidates) {
+fs::path FindBeside(const std::vector<std::string>& candidates) {
   std::error_code failed;
   const fs::path folder = fs::read_symlink("/proc/self/exe", failed).parent_path();
-  for (const char* candidate : candidates) {
+  for (const std::string& candidate : candidates) {
     if (const fs::path path = folder / candidate; fs::exists(path, failed)) {
       return fs::weakly_canonical(path, failed);
     }
   }
-  return folder / *candidates.begin();
+  return folder / candidates.front();
 }
 
 Result<std::vector<std::string>> LightNames(const std::string& path, int lights) {
@@ -192,7 +193,12 @@ int Serve(sateen::RigLoop& loop) {
 }
 
 Result<int> Run(const Args& args) {
-  auto board = sateen::VirtualBoard::Load(args.firmware);
+  const std::string image =
+      args.lights == 16 ? "sateen-controller-16.hex" : "sateen-controller.hex";
+  const std::string firmware =
+      args.firmware.empty() ? FindBeside({"../avr/" + image, "../share/sateen/" + image}).string()
+                            : args.firmware;
+  auto board = sateen::VirtualBoard::Load(firmware, sateen::ControllerWiring(args.lights));
   if (!board) {
     return tl::unexpected(board.error());
   }
@@ -222,7 +228,7 @@ Result<int> Run(const Args& args) {
   prctl(PR_SET_TIMERSLACK, 1000UL);  // or each wait of 100 us takes 50 us longer
   sateen::RigLoop loop(**board, *port,
                        {.names = *names, .opening_resets = args.opening_resets, .events = events});
-  loop.Start(args.firmware, *environment);
+  loop.Start(firmware, *environment);
   const int status = serve ? Serve(loop) : RunCommand(args, loop, *environment);
   loop.End();
   return status;
@@ -230,8 +236,11 @@ Result<int> Run(const Args& args) {
 
 void AddOptions(CLI::App& app, Args& args) {
   app.add_option("--rig", args.rig, "Rig file; names the lights in the events");
-  app.add_option("--firmware", args.firmware, "Firmware image to run, ELF or Intel HEX")
+  app.add_option("--lights", args.lights, "Lights of the board, 14 or 16")
+      ->check(CLI::IsMember({14, 16}))
       ->capture_default_str();
+  app.add_option("--firmware", args.firmware,
+                 "Firmware image to run, ELF or Intel HEX; default: ours for as many lights");
   app.add_flag("--opening-resets", args.opening_resets,
                "Opening the port resets the board for 1 s, as it does an Arduino Uno");
   app.add_option("--events", args.events, "Write what the lights do to this file, as JSON lines");
@@ -241,12 +250,10 @@ void AddOptions(CLI::App& app, Args& args) {
 
 int main(int argc, char** argv) {
   CLI::App app(
-      "A LED board without hardware: the controller's own firmware in a simulated ATmega328P, in "
+      "An LED board without hardware: the controller's own firmware in a simulated ATmega328P, in "
       "real time,\nwith its serial line on a pseudo terminal.",
       "sateen-virtual-rig");
   Args args;
-  args.firmware =
-      FindBeside({"../avr/sateen-controller.hex", "../share/sateen/sateen-controller.hex"});
   AddOptions(app, args);
   app.add_option("--port-link", args.port_link,
                  "Make this path a link to the pseudo terminal while the board is plugged in");

@@ -101,6 +101,10 @@ Status RigLoop::Command(const std::string& line) {
   } else if (verb == "brown-out") {
     board_.BrownOut(time);
   } else if (verb == "flash") {
+    if (!board_.HasFlashSync()) {
+      return Fail(ErrorCode::kInvalidArgument, "a board with {} lights has no flash sync",
+                  board_.LightCount());
+    }
     board_.FlashSync(true);
     flash_ends_ = board_.Now() + time;
   } else {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "core/check.h"
 #include "firmware/controller/pins.h"
 
 namespace sateen {
@@ -16,8 +17,8 @@ constexpr SimTime kShortestBreak = std::chrono::microseconds(100);
 #define SATEEN_PIN_OF(port, bit) SATEEN_PIN(port, bit)  // what a macro stands for, not its name
 #define SATEEN_LIGHT_PIN(channel, port, bit, arduino) SATEEN_PIN(port, bit),
 
-BoardWiring WiringOfPinsHeader() {
-  return {.lights = {SATEEN_LIGHT_PINS(SATEEN_LIGHT_PIN)},
+BoardWiring WiringOf14() {
+  return {.lights = {SATEEN_LIGHT_PINS_14(SATEEN_LIGHT_PIN)},
           .dimming = SATEEN_PIN_OF(SATEEN_DIM_PORT, SATEEN_DIM_BIT),
           .dimming_timer = 1,
           .dimming_unit = 'A',
@@ -25,11 +26,22 @@ BoardWiring WiringOfPinsHeader() {
           .shutter = SATEEN_PIN_OF(SATEEN_SHUTTER_PORT, SATEEN_SHUTTER_BIT)};
 }
 
+// Two more lights on the pins of flash sync and shutter.
+BoardWiring WiringOf16() {
+  BoardWiring wiring = WiringOf14();
+  wiring.lights = {SATEEN_LIGHT_PINS_16(SATEEN_LIGHT_PIN)};
+  wiring.flash_sync.reset();
+  wiring.shutter.reset();
+  return wiring;
+}
+
 }  // namespace
 
-const BoardWiring& ControllerWiring() {
-  static const BoardWiring kWiring = WiringOfPinsHeader();
-  return kWiring;
+const BoardWiring& ControllerWiring(int lights) {
+  SATEEN_CHECK(lights == 14 || lights == 16);
+  static const BoardWiring k14 = WiringOf14();
+  static const BoardWiring k16 = WiringOf16();
+  return lights == 14 ? k14 : k16;
 }
 
 VirtualBoard::VirtualBoard(BoardWiring wiring)
@@ -145,7 +157,8 @@ void VirtualBoard::OutputsChanged() {
   for (size_t k = 0; k < wiring_.lights.size(); ++k) {
     SetLevel(k, chip_->Drives(wiring_.lights[k]) ? dimming : 0);
   }
-  if (const bool closed = chip_->Drives(wiring_.shutter); closed != shutter_closed_) {
+  const bool closed = wiring_.shutter && chip_->Drives(*wiring_.shutter);
+  if (closed != shutter_closed_) {
     shutter_closed_ = closed;
     for (const auto& [id, watcher] : watchers_) {
       if (watcher.shutter) {

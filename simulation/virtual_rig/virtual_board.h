@@ -21,12 +21,12 @@ struct BoardWiring {
   ChipPin dimming;              // dimming input of all drivers, driven by a timer's compare unit
   int dimming_timer = 1;
   char dimming_unit = 'A';
-  ChipPin flash_sync;  // pulled up by the board, closed to ground by the camera
-  ChipPin shutter;     // high closes the camera's release contact
+  std::optional<ChipPin> flash_sync;  // pulled up by the board, closed to ground by the camera
+  std::optional<ChipPin> shutter;     // high closes the camera's release contact
 };
 
-// The wiring of our firmware, from firmware/controller/pins.h.
-[[nodiscard]] const BoardWiring& ControllerWiring();
+// The wiring of our firmware for 14 or for 16 lights, from firmware/controller/pins.h.
+[[nodiscard]] const BoardWiring& ControllerWiring(int lights = 14);
 
 // From `time` on, `light` shines at `level`, a part of its full power.
 struct LightChange {
@@ -98,8 +98,13 @@ class VirtualBoard {
   void Plug();
   [[nodiscard]] uint64_t TimesPlugged() const { return times_plugged_; }
   [[nodiscard]] bool Plugged() const { return chip_->HasPower(); }
-  // The camera closes its flash contact, or opens it.
-  void FlashSync(bool closed) { chip_->DriveInput(wiring_.flash_sync, !closed); }
+  [[nodiscard]] bool HasFlashSync() const { return wiring_.flash_sync.has_value(); }
+  // The camera closes its flash contact, or opens it; a board without the input does not notice.
+  void FlashSync(bool closed) {
+    if (wiring_.flash_sync) {
+      chip_->DriveInput(*wiring_.flash_sync, !closed);
+    }
+  }
 
   [[nodiscard]] Chip& InnerChip() { return *chip_; }
 

@@ -26,6 +26,9 @@ using std::chrono::seconds;
 inline std::filesystem::path Firmware() {
   return std::filesystem::path(SATEEN_FIRMWARE_DIR) / "sateen-controller.elf";
 }
+inline std::filesystem::path FirmwareFor16Lights() {
+  return std::filesystem::path(SATEEN_FIRMWARE_DIR) / "sateen-controller-16.elf";
+}
 // Hangs when it is told to.
 inline std::filesystem::path TestFirmware() {
   return std::filesystem::path(SATEEN_FIRMWARE_DIR) / "sateen-controller-test.elf";
@@ -176,8 +179,9 @@ class BoardTest : public ::testing::Test {
     }
   }
 
-  void Start(const std::filesystem::path& firmware) {
-    auto board = VirtualBoard::Load(firmware);
+  void Start(const std::filesystem::path& firmware,
+             const BoardWiring& wiring = ControllerWiring()) {
+    auto board = VirtualBoard::Load(firmware, wiring);
     ASSERT_TRUE(board) << board.error().message;
     board_ = std::move(*board);
     board_->Watch({.light = [this](const LightChange&) {

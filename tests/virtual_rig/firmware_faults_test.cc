@@ -111,6 +111,17 @@ TEST_F(FirmwareFaults, AWatchdogResetIsTakenForNothingElse) {
   EXPECT_EQ(talk_->Hello().reset_cause, SATEEN_RESET_EXTERNAL);
 }
 
+// The chip adds each cause to those that nobody has cleared.
+TEST_F(FirmwareFaults, OfSeveralResetsTheLatestCauseIsTold) {
+  for (const ResetCause cause : {ResetCause::kExternal, ResetCause::kBrownOut,
+                                 ResetCause::kWatchdog, ResetCause::kExternal}) {
+    board_->Reset(cause);
+    board_->RunFor(milliseconds(20));
+    EXPECT_EQ(talk_->Hello().reset_cause, static_cast<int>(cause));
+    EXPECT_EQ(talk_->Status().reset_cause, static_cast<int>(cause));
+  }
+}
+
 TEST_F(FirmwareFaults, OutputsAreOffFromTheFirstCycleOfEachReset) {
   for (const ResetCause cause :
        {ResetCause::kPowerOn, ResetCause::kExternal, ResetCause::kBrownOut}) {

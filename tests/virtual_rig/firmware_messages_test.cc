@@ -87,6 +87,41 @@ TEST_F(FirmwareMessages, EachLightIsOnThePinOfTheManual) {
   EXPECT_TRUE(board_->InnerChip().Drives({'C', 5}));  // A5
 }
 
+// Two lights more, on the pins of flash sync and shutter, which it then does not have.
+TEST_F(FirmwareMessages, WithSixteenLightsTheLastTwoAreOnA5AndD2) {
+  Start(FirmwareFor16Lights(), ControllerWiring(16));
+  const SateenGreeting greeting = talk_->Hello();
+  EXPECT_EQ(greeting.channels, 16);
+  EXPECT_EQ(greeting.max_on_ms[15], 10'000);
+
+  for (int k = 0; k < 16; ++k) {
+    const SateenState state = talk_->Light(k, 400, 1000);
+    EXPECT_EQ(state.lit, 1 << k);
+    EXPECT_THAT(board_->Lit(), ElementsAre(k));
+    EXPECT_DOUBLE_EQ(board_->Level(k), 0.4);
+    EXPECT_EQ(board_->InnerChip().Drives({'C', 5}), k == 14);  // A5
+    EXPECT_EQ(board_->InnerChip().Drives({'D', 2}), k == 15);  // D2
+  }
+  EXPECT_EQ(talk_->Do(SateenArm{.channel = 15, .level_permille = 400, .on_ms = 100}).result,
+            SATEEN_RESULT_UNKNOWN_MESSAGE);
+  EXPECT_EQ(talk_->Do(SateenTriggerShutter{.press_ms = 10}).result, SATEEN_RESULT_UNKNOWN_MESSAGE);
+  EXPECT_EQ(talk_->Light(16, 400, 1000).result, SATEEN_RESULT_OUT_OF_RANGE);
+  EXPECT_THAT(board_->Lit(), ElementsAre(15));  // refused commands change nothing
+
+  board_->RunFor(milliseconds(1001));
+  EXPECT_THAT(board_->Lit(), IsEmpty());
+  talk_->Light(15, 400, 1000);
+  EXPECT_EQ(talk_->Do(SateenAllOff{}).lit, 0);
+  for (const ChipPin& pin : ControllerWiring(16).lights) {
+    EXPECT_FALSE(board_->InnerChip().Drives(pin)) << pin.port << pin.bit;
+  }
+
+  talk_->Light(14, 400, 1000);
+  board_->Reset();
+  EXPECT_THAT(board_->Lit(), IsEmpty());
+  EXPECT_FALSE(board_->InnerChip().Drives({'C', 5}));
+}
+
 TEST_F(FirmwareMessages, EachChannelIsItsOwnLight) {
   talk_->Hello();
   for (int k = 0; k < SATEEN_CHANNELS; ++k) {
