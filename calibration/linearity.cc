@@ -37,7 +37,7 @@ class LinearityFit {
     Compare();
     for (size_t c = 0; c < 3; ++c) {
       FillBins(c);
-      FindRange(result_.rgb[c]);
+      FindRanges(result_.rgb[c]);
     }
     return std::move(result_);
   }
@@ -127,8 +127,12 @@ class LinearityFit {
     }
   }
 
-  // (2)
+  // (2). What a frame is off by in all its patches is no better known than that.
   void Compare() {
+    std::map<size_t, double> off;  // of frames
+    for (const FrameBrightness& frame : result_.frames) {
+      off[frame.frame] = frame.ratio - 1.0;
+    }
     for (const PatchSample& sample : samples_) {
       const double expected = ExpectedDn(sample);
       const bool is_of_series = times_of_light_.at(sample.light).size() >= kFewestExposures;
@@ -139,7 +143,7 @@ class LinearityFit {
                                   .expected_dn = expected,
                                   .measured_dn = sample.signal_dn,
                                   .is_clipped = sample.top_dn >= clipped_from});
-        sd_.push_back(sample.sd_dn / expected);
+        sd_.push_back(std::hypot(sample.sd_dn / expected, off[sample.frame]));
       }
     }
     black_dn_ = samples_.empty() ? 0.0 : samples_[0].black_dn;
@@ -171,35 +175,18 @@ class LinearityFit {
     }
   }
 
-  // From the middle of the reference range outwards.
-  void FindRange(ChannelLinearity& channel) const {
-    const std::vector<LinearityBin>& bins = channel.bins;
-    const auto start = std::ranges::find_if(bins, [&](const LinearityBin& bin) {
-      return bin.level_dn > kReferenceFrom * range_dn_ &&
-             std::abs(bin.deviation) <= options_.tolerance;
-    });
-    if (start == bins.end()) {
+  void FindRanges(ChannelLinearity& channel) const {
+    const double start_dn = kReferenceFrom * range_dn_;
+    const auto range = FindLinearRange(channel.bins, start_dn, options_.tolerance);
+    if (!range) {
       return;  // from 0 to 0
     }
-    const auto is_within = [&](const LinearityBin& bin) {
-      return std::abs(bin.deviation) <= options_.tolerance && bin.sd <= 0.5 * options_.tolerance;
-    };
-    auto low = start;
-    while (low != bins.begin() && is_within(*(low - 1))) {
-      --low;
-    }
-    auto high = start;
-    while (high + 1 != bins.end() && std::abs((high + 1)->deviation) <= options_.tolerance) {
-      ++high;
-    }
-    channel.linear_from_dn = black_dn_ + low->level_dn;
-    channel.linear_to_dn = black_dn_ + high->level_dn;
-    if (high + 1 != bins.end()) {
-      const LinearityBin& beyond = *(high + 1);
-      const double limit = std::copysign(options_.tolerance, beyond.deviation);
-      const double share = (limit - high->deviation) / (beyond.deviation - high->deviation);
-      channel.linear_to_dn += share * (beyond.level_dn - high->level_dn);
-      channel.departs = true;
+    channel.linear_from_dn = black_dn_ + range->from_dn;
+    channel.linear_to_dn = black_dn_ + range->to_dn;
+    channel.departs = range->departs;
+    const auto fine = FindLinearRange(channel.bins, start_dn, kFineTolerance);
+    if (fine) {
+      channel.fine_to_dn = std::min(black_dn_ + fine->to_dn, channel.linear_to_dn);
     }
   }
 

@@ -5,9 +5,12 @@
 #include <vector>
 
 #include "calibration/chart_readings.h"
+#include "calibration/linear_range.h"
 #include "core/error.h"
 
 namespace sateen {
+
+inline constexpr double kFineTolerance = 0.002;
 
 struct LinearityOptions {
   double tolerance = 0.01;  // of proportionality to exposure; (0, 0.2]
@@ -24,21 +27,17 @@ struct LinearityPoint {
   bool is_clipped = false;  // some of its sites are saturated
 };
 
-// Points of about one level. [DN above the dark]
-struct LinearityBin {
-  double level_dn = 0.0;
-  double deviation = 0.0;  // measured / expected - 1
-  double sd = 0.0;
-};
-
 struct ChannelLinearity {
   std::vector<LinearityBin> bins;  // from dark to bright, of points that are not clipped
   // Readings from here on are saturated. Nothing: no patch was. [DN as read]
   std::optional<double> saturation_dn;
   // Proportional to within the tolerance from here ... [DN as read]
   double linear_from_dn = 0.0;
-  double linear_to_dn = 0.0;  // ... to here, which is as high as was looked, or
+  double linear_to_dn = 0.0;  // ... to here, which is as high as bins tell, or
   bool departs = false;       // where the tolerance is left
+  // Proportional to within kFineTolerance up to here, for what needs more than the range: the
+  // exposure of sheets. Nothing: readings do not tell. [DN as read]
+  std::optional<double> fine_to_dn;
 };
 
 // How bright a frame is against its light's others, by its own exposure time; 1 where they agree.
@@ -59,10 +58,11 @@ struct Linearity {
 ///     s = a_p f(t),      a_p by least squares over signals of 3 to 50 % of the range         (1)
 ///     deviation = s / (a_p t) - 1                                                           (2)
 ///
-/// over all patches and all lights of three exposure times or more, in bins of 3 %. The range runs from the middle outwards to where the
-/// mean of a bin leaves the tolerance (interpolated), or is not known to half of it, downwards, or
-/// where patches end. What a light, a patch or a colour does to brightness cancels in (2); a wrong
-/// exposure time does not, and shows in all patches of its frame.
+/// over all patches and all lights of three exposure times or more, in bins of 3 %; the range is that of
+/// FindLinearRange() upwards and downwards of (1)'s lowest level. What a light, a patch or a colour
+/// does to brightness cancels in (2). A wrong exposure time or a light that flickers does not, and
+/// shows in all patches of its frame: their median there counts as a standard deviation beside the noise,
+/// so that one such frame does not end the range.
 ///
 /// Saturated are patches that should read a tenth more than any does: the level is the median of their
 /// sites less three robust standard deviations.

@@ -4,15 +4,11 @@
 #include <cmath>
 #include <iterator>
 #include <limits>
-#include <map>
-#include <set>
 #include <utility>
 
 namespace sateen {
 namespace {
 
-constexpr double kDarkShare = 0.01;   // of the range: the brightest patch of a light is above
-constexpr double kNotable = 0.004;    // brightness against exposure time that is warned of
 constexpr double kWellTested = 0.9;   // of saturation: linearity is known up to here or warned of
 constexpr double kFineNoiseDn = 0.4;  // read noise that rounding hides
 constexpr double kGainsDiffer = 0.01;
@@ -34,8 +30,9 @@ class ResponseFitter {
     samples_ = SamplesOf(readings_, dark_);
     result_.black_dn = dark_.black_dn;
     LeaveOutUneven();
-    const Status status =
-        CheckLights().and_then([&] { return CheckExposures(); }).and_then([&] { return Linear(); });
+    const Status status = CheckChartLights(readings_, samples_, dark_.black_dn)
+                              .and_then([&] { return MeasureLinearity(); })
+                              .and_then([&] { return SetWhite(); });
     if (!status) {
       return tl::unexpected(status.error());
     }
@@ -46,54 +43,14 @@ class ResponseFitter {
   }
 
  private:
-  // Of each light, the frame whose brightest patch is brightest without a saturated site.
-  [[nodiscard]] std::map<size_t, size_t> BestFrames() const {
-    std::map<size_t, std::pair<size_t, double>> best;
-    std::set<size_t> spoilt;
-    for (const PatchSample& sample : samples_) {
-      if (sample.top_dn >= HighestDn()) {
-        spoilt.insert(sample.frame);
-      }
-    }
-    for (const PatchSample& sample : samples_) {
-      auto& [frame, brightness] = best[sample.light];
-      if (!spoilt.contains(sample.frame) && sample.signal_dn > brightness) {
-        frame = sample.frame;
-        brightness = sample.signal_dn;
-      }
-    }
-    std::map<size_t, size_t> frames;
-    for (const auto& [light, found] : best) {
-      if (found.second > 0.0) {
-        frames[light] = found.first;
-      }
-    }
-    return frames;
-  }
-
-  // What no site reads that is not saturated: the highest reading of all, or the file's white.
-  [[nodiscard]] double HighestDn() const {
-    double highest = 0.0;
-    for (const PatchSample& sample : samples_) {
-      highest = std::max(highest, sample.top_dn);
-    }
-    return std::min(highest, readings_.file_white_dn);
-  }
-
   void LeaveOutUneven() {
-    for (const auto& [light, frame] : BestFrames()) {
-      for (size_t patch = 0; patch < readings_.patches.size(); ++patch) {
-        const double unevenness = UnevennessOf(readings_.patches[patch],
-                                               readings_.frames[frame].dn[patch], dark_.black_dn);
-        if (unevenness > options_.most_uneven) {
-          result_.uneven.push_back({light, patch, unevenness});
-          result_.warnings.push_back(fmt::format(
-              "{}: patch '{}' is uneven by {:.0f} % and left out under light '{}'; look for dust, "
-              "glare or a shadow",
-              readings_.frames[frame].file, readings_.patch_names[patch], 100.0 * unevenness,
-              readings_.lights[light]));
-        }
-      }
+    result_.uneven = FindUnevenPatches(readings_, samples_, dark_.black_dn, options_.most_uneven);
+    for (const UnevenPatch& uneven : result_.uneven) {
+      result_.warnings.push_back(fmt::format(
+          "{}: patch '{}' is uneven by {:.0f} % and left out under light '{}'; look for dust, "
+          "glare or a shadow",
+          readings_.frames[uneven.frame].file, readings_.patch_names[uneven.patch],
+          100.0 * uneven.unevenness, readings_.lights[uneven.light]));
     }
     std::erase_if(samples_, [&](const PatchSample& sample) {
       return std::ranges::any_of(result_.uneven, [&](const UnevenPatch& uneven) {
@@ -102,93 +59,32 @@ class ResponseFitter {
     });
   }
 
-  // Each light has a frame with something in it, and one that is not saturated all over.
-  [[nodiscard]] Status CheckLights() const {
-    const double range_dn = readings_.file_white_dn - dark_.black_dn;
-    std::map<size_t, const PatchSample*> brightest;
-    std::map<size_t, const PatchSample*> darkest;
-    for (const ChartFrame& frame : readings_.frames) {
-      if (frame.light) {
-        brightest.try_emplace(*frame.light, nullptr);
-      }
-    }
-    for (const PatchSample& sample : samples_) {
-      const PatchSample*& bright = brightest[sample.light];
-      bright = bright == nullptr || sample.signal_dn > bright->signal_dn ? &sample : bright;
-      const PatchSample*& dark = darkest[sample.light];
-      dark = dark == nullptr || sample.signal_dn < dark->signal_dn ? &sample : dark;
-    }
-    for (const auto& [light, sample] : brightest) {
-      const std::string& name = readings_.lights[light];
-      if (sample == nullptr) {
-        return Fail(ErrorCode::kBadData,
-                    "light '{}': every patch is uneven; is the chart where it should be, clean and "
-                    "in no shadow?",
-                    name);
-      }
-      if (sample->signal_dn < kDarkShare * range_dn) {
-        return Fail(ErrorCode::kBadData,
-                    "{}: the chart is dark under light '{}': its brightest patch reads {:.0f} DN "
-                    "above black; did the light come on?",
-                    readings_.frames[sample->frame].file, name, sample->signal_dn);
-      }
-      const PatchSample& low = *darkest[light];
-      if (low.signal_dn > 0.9 * (HighestDn() - low.black_dn)) {
-        return Fail(ErrorCode::kBadData,
-                    "{}: every patch is saturated under light '{}' in all its frames; expose for "
-                    "less",
-                    readings_.frames[low.frame].file, name);
-      }
-    }
-    return {};
-  }
-
-  // The exposure time whose frames of that light are as bright as this one.
-  [[nodiscard]] std::optional<double> LikelyExposure(const FrameBrightness& wrong) const {
-    const ChartFrame& frame = readings_.frames[wrong.frame];
-    const double likely_s = wrong.ratio * frame.exposure_s;
-    for (const ChartFrame& other : readings_.frames) {
-      if (other.light == frame.light && std::abs(other.exposure_s / likely_s - 1.0) < 0.02) {
-        return other.exposure_s;
-      }
-    }
-    return std::nullopt;
-  }
-
-  Status CheckExposures() {
+  Status MeasureLinearity() {
     Result<Linearity> linearity = FitLinearity(readings_, samples_, options_.linearity);
     if (!linearity) {
       return tl::unexpected(linearity.error());
     }
     result_.linearity = std::move(*linearity);
-    FrameBrightness worst;
-    for (const FrameBrightness& frame : result_.linearity.frames) {
-      if (std::abs(std::log(frame.ratio)) > std::abs(std::log(worst.ratio))) {
-        worst = frame;
-      }
-    }
-    if (std::abs(worst.ratio - 1.0) > options_.most_off) {
-      const ChartFrame& frame = readings_.frames[worst.frame];
-      const std::optional<double> likely_s = LikelyExposure(worst);
-      return Fail(ErrorCode::kBadData,
-                  "{}: is {:.3g} times as bright as its {:g} s say by the other frames of light "
-                  "'{}'{}; are frames swapped, or was the light not the same?",
-                  frame.file, worst.ratio, frame.exposure_s, readings_.lights[*frame.light],
-                  likely_s ? fmt::format(", as bright as {:g} s are", *likely_s) : "");
-    }
-    if (std::abs(worst.ratio - 1.0) > kNotable) {
-      result_.warnings.push_back(fmt::format(
-          "{}: is {:+.1f} % off its exposure time; the light flickers or the shutter is not exact, "
-          "and linearity is known no better",
-          readings_.frames[worst.frame].file, 100.0 * (worst.ratio - 1.0)));
-    }
-    return {};
+    return CheckExposures(readings_, result_.linearity.frames, options_.most_off, result_.warnings);
   }
 
-  Status Linear() {
+  [[nodiscard]] bool IsHiddenByNoise(const ChannelLinearity& channel) const {
+    return std::ranges::none_of(channel.bins, [&](const LinearityBin& bin) {
+      return bin.sd <= 0.5 * options_.linearity.tolerance;
+    });
+  }
+
+  // Saturation, or where a colour stops being linear.
+  Status SetWhite() {
     double departs_dn = std::numeric_limits<double>::infinity();
     double tested_dn = std::numeric_limits<double>::infinity();
     for (const ChannelLinearity& channel : result_.linearity.rgb) {
+      if (channel.linear_to_dn <= 0.0 && IsHiddenByNoise(channel)) {
+        return Fail(ErrorCode::kBadData,
+                    "noise hides whether readings are proportional to exposure time to within {:g} "
+                    "%; need larger patches or more frames of each exposure, or a looser tolerance",
+                    100.0 * options_.linearity.tolerance);
+      }
       if (channel.linear_to_dn <= 0.0) {
         return Fail(ErrorCode::kBadData,
                     "the readings are nowhere proportional to exposure time to within {:g} %; need "

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "calibration/chart_check.h"
 #include "calibration/chart_readings.h"
 #include "calibration/linearity.h"
 #include "calibration/photon_transfer.h"
@@ -11,13 +12,6 @@
 #include "core/error.h"
 
 namespace sateen {
-
-// A patch that is not one even grey under a light.
-struct UnevenPatch {
-  size_t light = 0;
-  size_t patch = 0;
-  double unevenness = 0.0;  // relative, beyond the noise
-};
 
 struct ResponseFitOptions {
   LinearityOptions linearity;

@@ -26,7 +26,7 @@ struct CalibrateLensArgs {
 };
 
 // How far corners of one row or column lie from the straight line between its ends, at most.
-struct Bow {
+struct LineDeviation {
   double before_px = 0.0;  // as photographed
   double after_px = 0.0;   // without the lens's distortion
 };
@@ -35,7 +35,7 @@ struct LensCalibration : RigCalibration {
   BoardSpec board;
   FoundBoards found;
   LensFit fit;
-  Bow bow;                            // of the view that bows most
+  LineDeviation line_deviation;       // of the view where it is largest
   std::optional<double> focal_error;  // relative, against truth/rig.json of a simulated board
   std::optional<double> principal_error_px;  // the same
 };

@@ -161,7 +161,8 @@ std::vector<Chain> ChainsOf(const BoardView& view, int corner_columns) {
   return chains;
 }
 
-double BowOf(const std::vector<Eigen::Vector2d>& corners, const std::vector<Chain>& chains) {
+double LineDeviationPx(const std::vector<Eigen::Vector2d>& corners,
+                       const std::vector<Chain>& chains) {
   double most = 0.0;
   for (const Chain& chain : chains) {
     const Eigen::Vector2d& from = corners[chain.front()];
@@ -221,15 +222,16 @@ Rgb8 LinedPanel(const Image<uint8_t>& grey, const std::vector<Eigen::Vector2d>& 
   return canvas.Taken();
 }
 
-// The view used whose rows and columns bow most.
+// The view used whose rows and columns are farthest from straight.
 size_t MostBentView(const LensCalibration& result) {
   size_t best = 0;
   double most_px = -1.0;
   for (size_t i = 0; i < result.found.views.size(); ++i) {
     const BoardView& view = result.found.views[i];
-    const double bow_px = BowOf(view.corners_px, ChainsOf(view, result.board.columns - 1));
-    if (result.fit.views[i].left_out.empty() && bow_px > most_px) {
-      most_px = bow_px;
+    const double deviation_px =
+        LineDeviationPx(view.corners_px, ChainsOf(view, result.board.columns - 1));
+    if (result.fit.views[i].left_out.empty() && deviation_px > most_px) {
+      most_px = deviation_px;
       best = i;
     }
   }
@@ -245,13 +247,14 @@ Result<Rgb8> BeforeAndAfter(LensCalibration& result) {
   const BoardView& view = result.found.views[best];
   const std::vector<Chain> chains = ChainsOf(view, result.board.columns - 1);
   const std::vector<Eigen::Vector2d> straight = Undistorted(result.fit.camera, view.corners_px);
-  result.bow = {BowOf(view.corners_px, chains), BowOf(straight, chains)};
+  result.line_deviation = {LineDeviationPx(view.corners_px, chains),
+                           LineDeviationPx(straight, chains)};
   return ContactSheet(
       {LinedPanel(picture->grey, view.corners_px, chains,
-                  fmt::format("{} as photographed: rows bow by {:.2f} px", view.name,
-                              result.bow.before_px)),
+                  fmt::format("{} as photographed: {:.2f} px off straight lines", view.name,
+                              result.line_deviation.before_px)),
        LinedPanel(Undistorted(result.fit.camera, picture->grey), straight, chains,
-                  fmt::format("without distortion: {:.2f} px", result.bow.after_px))},
+                  fmt::format("without distortion: {:.2f} px", result.line_deviation.after_px))},
       2);
 }
 

@@ -48,7 +48,8 @@ std::string JsonReport(const CalibrateLensArgs& args, const LensCalibration& res
       {"distortion_sd", fit.distortion_sd},
       {"rms_px", fit.rms_px},
       {"held_out_rms_px", fit.held_out_rms_px},
-      {"bow_px", {{"before", result.bow.before_px}, {"after", result.bow.after_px}}},
+      {"line_deviation_px",
+       {{"before", result.line_deviation.before_px}, {"after", result.line_deviation.after_px}}},
       {"coverage",
        {{"cells", {fit.coverage.width, fit.coverage.height}}, {"corners", fit.coverage.pixels}}},
       {"seconds", result.seconds},
@@ -103,11 +104,10 @@ std::string TextReport(const CalibrateLensArgs& args, const LensCalibration& res
                         fit.distortion_sd[i], i + 1 < kNames.size() ? "," : "\n");
   }
   text += fmt::format(
-      "error {:.3f} px over {} views of {}, {:.3f} px where a view is held out; lines bow by "
-      "{:.2f} "
-      "px, without distortion by {:.2f} px\n",
+      "error {:.3f} px over {} views of {}, {:.3f} px where a view is held out\n"
+      "rows of corners are up to {:.2f} px off straight lines, {:.2f} px without distortion\n",
       fit.rms_px, used, fit.views.size() + result.found.rejected.size(), fit.held_out_rms_px,
-      result.bow.before_px, result.bow.after_px);
+      result.line_deviation.before_px, result.line_deviation.after_px);
   if (result.focal_error) {
     text += fmt::format(
         "error against truth/rig.json: focal length {:.3g} %, principal point {:.3g} px\n",

@@ -1,6 +1,8 @@
 #include "cli/calibrate_response_report.h"
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 #include <nlohmann/json.hpp>
 
 #include "core/angle.h"
@@ -21,6 +23,7 @@ nlohmann::json LinearityJson(const ChannelLinearity& channel) {
   nlohmann::json json = {{"from_dn", channel.linear_from_dn},
                          {"to_dn", channel.linear_to_dn},
                          {"departs", channel.departs},
+                         {"fine_to_dn", OrNull(channel.fine_to_dn)},
                          {"saturation_dn", OrNull(channel.saturation_dn)},
                          {"bins", nlohmann::json::array()}};
   for (const LinearityBin& bin : channel.bins) {
@@ -55,15 +58,32 @@ nlohmann::json LightsJson(const ResponseCalibration& result) {
 }
 
 std::string LinearityText(const ResponseCalibration& result) {
-  std::string text = "\n           linear from       to      saturated from [DN]\n";
+  std::string text =
+      fmt::format("\n{:<10}{:>8}{:>16}{:>16}{:>17} [DN]\n", "linear", "from",
+                  fmt::format("to, {:g} %", 100.0 * result.tolerance),
+                  fmt::format("to, {:g} %", 100.0 * kFineTolerance), "saturated from");
+  const auto dn = [](const std::optional<double>& value, std::string_view none) {
+    return value ? fmt::format("{:.0f}", *value) : std::string(none);
+  };
+  bool is_open = false;
+  double sheets_dn = std::numeric_limits<double>::infinity();
   for (size_t c = 0; c < 3; ++c) {
     const ChannelLinearity& channel = result.fit.linearity.rgb[c];
-    text += fmt::format(
-        "  {:<8} {:>11.0f} {:>8.0f}{:<4} {:>8}\n", kChannelNames[c], channel.linear_from_dn,
-        channel.linear_to_dn, channel.departs ? "" : " +",
-        channel.saturation_dn ? fmt::format("{:.0f}", *channel.saturation_dn) : "not seen");
+    is_open = is_open || !channel.departs;
+    sheets_dn = std::min(sheets_dn, channel.fine_to_dn.value_or(0.0));
+    text +=
+        fmt::format("  {:<8}{:>8.0f}{:>16}{:>16}{:>17}\n", kChannelNames[c], channel.linear_from_dn,
+                    fmt::format("{}{:.0f}", channel.departs ? "" : "> ", channel.linear_to_dn),
+                    dn(channel.fine_to_dn, "not known"), dn(channel.saturation_dn, "not seen"));
   }
-  return text + "  +: no patch was brighter and not saturated\n";
+  if (is_open) {
+    text += "  >: no patch tells of what is brighter\n";
+  }
+  if (sheets_dn > 0.0) {
+    text += fmt::format(
+        "  expose white paper to half or two thirds of white, at most to {:.0f} DN\n", sheets_dn);
+  }
+  return text;
 }
 
 std::string BalanceText(const ResponseCalibration& result) {

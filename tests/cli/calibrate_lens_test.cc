@@ -123,9 +123,9 @@ TEST_F(CalibrateLensCommand, LensThenPoseOfSimulatedBoards) {
       where["position_sd_mm"].dump());
   EXPECT_LT(figures["focal_error"].get<double>(), 1e-3);
   EXPECT_LT(figures["principal_error_px"].get<double>(), 1.0);
-  EXPECT_LT(figures["bow_px"]["after"].get<double>(), 0.3);  // noise of single corners
-  EXPECT_GT(figures["bow_px"]["before"].get<double>(),
-            2.0 * figures["bow_px"]["after"].get<double>());
+  EXPECT_LT(figures["line_deviation_px"]["after"].get<double>(), 0.3);  // noise of single corners
+  EXPECT_GT(figures["line_deviation_px"]["before"].get<double>(),
+            2.0 * figures["line_deviation_px"]["after"].get<double>());
   // The lens's own error moves the pose with it, most of all its focal length the distance.
   EXPECT_LT(where["position_error_mm"].get<double>(), 1.0);
   EXPECT_LT(where["rotation_error_deg"].get<double>(), 0.1);
@@ -290,8 +290,8 @@ TEST(CalibrateLensOfPhotographs, FourteenOfOpenCv) {
   EXPECT_THAT(run.log, Not(HasSubstr("not used")));
   EXPECT_EQ(run.Json()["views"].size(), 14U);
   EXPECT_LT(run.Json()["rms_px"].get<double>(), 0.2);
-  EXPECT_LT(run.Json()["bow_px"]["after"].get<double>(),
-            0.1 * run.Json()["bow_px"]["before"].get<double>());
+  EXPECT_LT(run.Json()["line_deviation_px"]["after"].get<double>(),
+            0.1 * run.Json()["line_deviation_px"]["before"].get<double>());
 }
 
 // 20 x 20 squares of 4 mm, markers of 3.2 mm, of which each photograph shows a third. Its authors
