@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core.hpp>
 
@@ -110,12 +111,49 @@ Result<RawLensFit> FitWithoutOutliers(const std::vector<BoardView>& views, ViewS
   }
 }
 
-// Errors of views by lenses fitted without them.
+// Where the lens puts what a pinhole camera of the same matrix has at the corners of the image, less
+// that; nothing where its distortion turns back before.
+std::optional<Eigen::Matrix<double, 2, 4>> CornerDisplacements(const Camera& lens) {
+  Eigen::Matrix<double, 2, 4> displacements;
+  for (int i = 0; i < 4; ++i) {
+    const Eigen::Vector2d corner(i % 2 == 0 ? 0.0 : lens.size_px.width - 1.0,
+                                 i < 2 ? 0.0 : lens.size_px.height - 1.0);
+    const auto at = PixelOfPinholePixel(lens, corner.x(), corner.y());
+    if (!at) {
+      return std::nullopt;
+    }
+    displacements.col(i) = *at - corner;
+  }
+  return displacements;
+}
+
+// Standard deviation by the jackknife, of lenses each without one of as many parts of the views.
+double CornerSdPx(const std::vector<Camera>& lenses) {
+  std::vector<Eigen::Matrix<double, 2, 4>> displacements;
+  Eigen::Matrix<double, 2, 4> mean = Eigen::Matrix<double, 2, 4>::Zero();
+  const auto count = static_cast<double>(lenses.size());
+  for (const Camera& lens : lenses) {
+    const auto own = CornerDisplacements(lens);
+    if (!own) {
+      return std::numeric_limits<double>::infinity();
+    }
+    displacements.push_back(*own);
+    mean += *own / count;
+  }
+  Eigen::Matrix<double, 1, 4> variance = Eigen::Matrix<double, 1, 4>::Zero();
+  for (const auto& own : displacements) {
+    variance += (count - 1.0) / count * (own - mean).colwise().squaredNorm();
+  }
+  return std::sqrt(variance.maxCoeff());
+}
+
+// Errors of views by lenses fitted without them, and what these lenses differ by.
 Status HoldOut(const std::vector<BoardView>& views, const ViewSet& set, size_t folds,
                LensFit& report) {
   folds = std::min(folds, set.size());
   double sum_px2 = 0.0;
   size_t corners = 0;
+  std::vector<Camera> lenses;
   for (size_t fold = 0; fold < folds; ++fold) {
     ViewSet others;
     others.reserve(set.size());
@@ -128,6 +166,7 @@ Status HoldOut(const std::vector<BoardView>& views, const ViewSet& set, size_t f
     if (!fit) {
       return tl::unexpected<Error>(fit.error());
     }
+    lenses.push_back(fit->camera);
     for (size_t i = fold; i < set.size(); i += folds) {
       const BoardView& view = views[set[i]];
       const Result<PlanePose> pose = SolvePlanePose(fit->camera, view.points_mm, view.corners_px);
@@ -140,6 +179,7 @@ Status HoldOut(const std::vector<BoardView>& views, const ViewSet& set, size_t f
       corners += view.ids.size();
     }
   }
+  report.corner_sd_px = CornerSdPx(lenses);
   report.held_out_rms_px = std::sqrt(sum_px2 / static_cast<double>(corners));
   return {};
 }

@@ -41,6 +41,9 @@ struct LensFit {
   double held_out_rms_px = 0.0;           // of views held out, each with its own pose fitted
   std::array<double, 4> pinhole_sd = {};  // standard deviations: fx, fy, cx, cy [px]
   std::array<double, 5> distortion_sd = {};
+  // How well distortion is known at the image's corners, where its terms do the most: of the
+  // displacement there, worst corner, from lenses fitted without parts of the views (jackknife).
+  double corner_sd_px = 0.0;
   std::vector<LensViewReport> views;  // as given
   Image<int> coverage;                // corners used, in a grid over the image
   std::vector<std::string> warnings;  // what to photograph for a better lens; empty if all is well

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "calibration/lens.h"
@@ -11,6 +12,7 @@ constexpr size_t kEnoughViews = 8;
 constexpr double kEnoughSpread = 30.0 * kRadPerDeg;
 constexpr double kEnoughCovered = 0.7;  // of the cells
 constexpr double kFocalSd = 2e-3;       // relative
+constexpr double kCornerSdPx = 1.0;
 constexpr double kHeldOutRatio = 1.5;
 constexpr double kBlurRatio = 2.0;  // of the median
 constexpr double kSharpPx = 1.2;    // an edge width that is never called blurred
@@ -33,6 +35,29 @@ void WarnOfBlur(const LensFit& fit, std::vector<std::string>& warnings) {
           view.name, view.edge_px, *middle));
     }
   }
+}
+
+// A term is small against its standard deviation wherever the lens has little of it; what counts is what
+// that leaves open in the picture.
+void WarnOfDistortion(const LensFit& fit, std::vector<std::string>& warnings) {
+  if (!(fit.corner_sd_px > kCornerSdPx)) {
+    return;
+  }
+  constexpr std::array kNames = {"k1", "k2", "p1", "p2", "k3"};
+  std::vector<std::string> unknown;
+  for (size_t i = 0; i < kNames.size(); ++i) {
+    if (fit.distortion_sd[i] > std::abs(fit.camera.distortion[i])) {
+      unknown.push_back(fmt::format("{} {:.3g} +- {:.3g}", kNames[i], fit.camera.distortion[i],
+                                    fit.distortion_sd[i]));
+    }
+  }
+  const std::string how_well = std::isfinite(fit.corner_sd_px)
+                                   ? fmt::format("known to {:.1f} px", fit.corner_sd_px)
+                                   : "not known: by some of the views the lens folds there";
+  warnings.push_back(
+      fmt::format("distortion in the corners of the image is {}{}{}; take more views with the "
+                  "board reaching into all four corners",
+                  how_well, unknown.empty() ? "" : "; not determined: ", fmt::join(unknown, ", ")));
 }
 
 }  // namespace
@@ -93,6 +118,7 @@ std::vector<std::string> WarningsOf(const LensFit& fit) {
     warnings.push_back(fmt::format(
         "the focal length is known to {:.2f} %; take more views, tilted more", 100.0 * focal_sd));
   }
+  WarnOfDistortion(fit, warnings);
   if (fit.held_out_rms_px > kHeldOutRatio * fit.rms_px) {
     warnings.push_back(
         fmt::format("views held out are off by {:.2f} px and the others by {:.2f}; take more views",

@@ -46,6 +46,7 @@ std::string JsonReport(const CalibrateLensArgs& args, const LensCalibration& res
       {"k_sd", fit.pinhole_sd},
       {"distortion", lens.distortion},
       {"distortion_sd", fit.distortion_sd},
+      {"corner_sd_px", fit.corner_sd_px},
       {"rms_px", fit.rms_px},
       {"held_out_rms_px", fit.held_out_rms_px},
       {"line_deviation_px",
@@ -104,10 +105,11 @@ std::string TextReport(const CalibrateLensArgs& args, const LensCalibration& res
                         fit.distortion_sd[i], i + 1 < kNames.size() ? "," : "\n");
   }
   text += fmt::format(
+      "                 in the corners of the image known to {:.2f} px\n"
       "error {:.3f} px over {} views of {}, {:.3f} px where a view is held out\n"
       "rows of corners are up to {:.2f} px off straight lines, {:.2f} px without distortion\n",
-      fit.rms_px, used, fit.views.size() + result.found.rejected.size(), fit.held_out_rms_px,
-      result.line_deviation.before_px, result.line_deviation.after_px);
+      fit.corner_sd_px, fit.rms_px, used, fit.views.size() + result.found.rejected.size(),
+      fit.held_out_rms_px, result.line_deviation.before_px, result.line_deviation.after_px);
   if (result.focal_error) {
     text += fmt::format(
         "error against truth/rig.json: focal length {:.3g} %, principal point {:.3g} px\n",

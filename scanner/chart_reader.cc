@@ -7,6 +7,7 @@
 #include "core/parallel.h"
 #include "imaging/raw.h"
 #include "scanner/frame_loader.h"
+#include "scanner/patch_places.h"
 #include "scanner/session_layout.h"
 #include "scanner/stack_reader.h"
 
@@ -15,17 +16,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kRead = 0.6;          // of a patch's side
 constexpr double kBrightShare = 0.02;  // of the picture: the white patch and more
 constexpr float kWellBelowWhite = 0.5F;
 constexpr float kBelowWhite = 0.9F;
 constexpr size_t kFewestPatchSites = 400;  // of a patch: a hundred red ones
-
-// Where in the mosaic the sites of a patch are.
-struct PatchPlaces {
-  PatchSites sites;
-  std::vector<size_t> index;
-};
 
 struct ChartFile {
   FrameFile file;
@@ -184,7 +178,11 @@ class ChartReader {
     }
     capture_.pose = *pose;
     for (const ChartPatch& patch : chart_.patches) {
-      places_.push_back(PlacesOf(patch));
+      places_.push_back(PlacesOf(patch, chart_.patch_mm, camera, pose->table_from_chart, mosaic));
+      std::vector<Eigen::Vector2d>& corners = capture_.corners.emplace_back();
+      for (const Eigen::Vector2d& corner_px : places_.back().corners_px) {
+        corners.emplace_back(0.5 * corner_px - Eigen::Vector2d::Constant(0.25));
+      }
       if (places_.back().index.size() < kFewestPatchSites) {
         return Fail(
             ErrorCode::kBadData,
@@ -195,55 +193,6 @@ class ChartReader {
       }
     }
     return {};
-  }
-
-  // Corners of what is read of a patch, in pixels, in turn around it.
-  [[nodiscard]] std::vector<Eigen::Vector2d> CornersOf(const ChartPatch& patch) const {
-    std::vector<Eigen::Vector2d> corners;
-    for (const auto& [x, y] : {std::pair{-1, -1}, {1, -1}, {1, 1}, {-1, 1}}) {
-      const Eigen::Vector2d in_chart =
-          patch.center_mm + 0.5 * kRead * chart_.patch_mm * Eigen::Vector2d(x, y);
-      const Eigen::Vector2d on_table = capture_.pose.table_from_chart * in_chart;
-      corners.push_back(PixelOfTablePoint(*capture_.rig.camera, {on_table.x(), on_table.y(), 0.0}));
-    }
-    return corners;
-  }
-
-  [[nodiscard]] PatchPlaces PlacesOf(const ChartPatch& patch) {
-    const std::vector<Eigen::Vector2d> corners = CornersOf(patch);
-    capture_.corners.emplace_back();
-    Eigen::Array2d low = corners[0];
-    Eigen::Array2d high = corners[0];
-    for (const Eigen::Vector2d& corner : corners) {
-      capture_.corners.back().push_back(0.5 * corner - Eigen::Vector2d::Constant(0.25));
-      low = low.min(corner.array());
-      high = high.max(corner.array());
-    }
-    PatchPlaces places;
-    const Image<float>& samples = first_.samples;
-    const Eigen::Isometry2d chart_from_table = capture_.pose.table_from_chart.inverse();
-    const int right = std::min(samples.width - 1, static_cast<int>(std::ceil(high.x())) + 1);
-    const int bottom = std::min(samples.height - 1, static_cast<int>(std::ceil(high.y())) + 1);
-    for (int y = std::max(0, static_cast<int>(low.y()) - 1); y <= bottom; ++y) {
-      for (int x = std::max(0, static_cast<int>(low.x()) - 1); x <= right; ++x) {
-        const auto on_table = TablePointOfPixel(*capture_.rig.camera, x, y);
-        if (!on_table) {
-          continue;
-        }
-        const Eigen::Array2d place =
-            (chart_from_table * Eigen::Vector2d(on_table->head<2>()) - patch.center_mm) /
-                (kRead * chart_.patch_mm) +
-            Eigen::Vector2d::Constant(0.5);  // 0 to 1 within what is read
-        if ((place >= 0.0).all() && (place < 1.0).all()) {
-          const auto column = static_cast<int>(place.x() * kPatchBlocks);
-          const auto row = static_cast<int>(place.y() * kPatchBlocks);
-          places.index.push_back(samples.Index(x, y));
-          places.sites.colour.push_back(first_.cfa[static_cast<size_t>(y % 2 * 2 + x % 2)]);
-          places.sites.block.push_back(static_cast<uint8_t>(row * kPatchBlocks + column));
-        }
-      }
-    }
-    return places;
   }
 
   Result<ChartFrame> ReadFrame(const ChartFile& chart_file, std::string& sha256) const {

@@ -13,6 +13,7 @@ namespace sateen {
 namespace {
 
 using namespace sateen::testing;
+using ::testing::Contains;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
@@ -39,6 +40,8 @@ struct Errors {
   double focal = 0.0;         // relative, worst of fx and fy over the runs
   double principal_px = 0.0;  // worst of cx and cy
   double over_sd = 0.0;       // root mean square of the four errors over their standard deviations
+  double corner_px = 0.0;  // of the displacement by distortion, root mean square over the corners
+  double corner_sd_px = 0.0;  // what the fits say of that, the worst corner
 };
 
 // Four lenses from 20 views each, 0.1 px of noise.
@@ -58,8 +61,23 @@ Errors ErrorsOf(const Camera& truth, const BoardSpec& board, double distance_mm)
     errors.focal = std::max(errors.focal, off.head<2>().abs().maxCoeff() / truth.fx);
     errors.principal_px = std::max(errors.principal_px, off.tail<2>().abs().maxCoeff());
     errors.over_sd += (off / sd).square().mean() / kRuns;
+    for (const double x : {0.0, truth.size_px.width - 1.0}) {
+      for (const double y : {0.0, truth.size_px.height - 1.0}) {
+        const Eigen::Vector2d moved = *PixelOfPinholePixel(fit.camera, x, y);
+        errors.corner_px +=
+            (moved - *PixelOfPinholePixel(truth, x, y)).squaredNorm() / (4.0 * kRuns);
+      }
+    }
+    errors.corner_sd_px += fit.corner_sd_px * fit.corner_sd_px / kRuns;
   }
   errors.over_sd = std::sqrt(errors.over_sd);
+  errors.corner_px = std::sqrt(errors.corner_px);
+  errors.corner_sd_px = std::sqrt(errors.corner_sd_px);
+  fmt::print("distortion in the corners off by {:.3f} px, +- {:.3f} in the worst\n",
+             errors.corner_px, errors.corner_sd_px);
+  // The worst of four of a few lenses: as large as the mean error or a little larger.
+  EXPECT_LT(errors.corner_px, 1.3 * errors.corner_sd_px);
+  EXPECT_GT(errors.corner_px, 0.3 * errors.corner_sd_px);
   return errors;
 }
 
@@ -115,6 +133,10 @@ TEST(CalibrateLens, FourteenPhotosOfOpenCv) {
   const LensFit fit = CalibrateLens(photographs.views, {640, 480}).value();
   fmt::print("opencv-left: error {:.3f} px, held out {:.3f} px, focal {:.2f} +- {:.2f} px\n",
              fit.rms_px, fit.held_out_rms_px, fit.camera.fx, fit.pinhole_sd[0]);
+  // k3 0.03 +- 0.11: the boards leave the corners out.
+  EXPECT_GT(fit.corner_sd_px, 1.0);
+  EXPECT_THAT(fit.warnings,
+              Contains(HasSubstr("px; not determined: p2 -0.000149 +- 0.00018, k3 ")));
   EXPECT_LT(fit.rms_px, 0.2);  // published: 0.393 on 13 of them
   EXPECT_LT(fit.held_out_rms_px, 0.25);
   EXPECT_NEAR(fit.camera.fx, 532.7, 1.0);
@@ -168,6 +190,8 @@ TEST(CalibrateLens, WarnsOfCornersWithoutABoardAndOfFewViews) {
   EXPECT_THAT(all, HasSubstr("top left, top right, bottom left, bottom right"));
   EXPECT_THAT(all, HasSubstr("the views are alike"));
   EXPECT_THAT(all, HasSubstr("% of the image"));
+  EXPECT_THAT(all, HasSubstr("distortion in the corners of the image is known to"));
+  EXPECT_THAT(all, HasSubstr("the board reaching into all four corners"));
 }
 
 TEST(CalibrateLens, ErrorsSayWhatToDo) {

@@ -49,10 +49,15 @@ TEST(ResponseFit, MeasuresALinearSensor) {
   // All: the geometric mean.
   EXPECT_NEAR(fit.white_balance[0],
               std::sqrt(fit.lights[0]->white_balance[0] * fit.lights[1]->white_balance[0]), 1e-12);
+  const double relative_sd = std::hypot(fit.lights[0]->sd[2] / fit.lights[0]->white_balance[2],
+                                        fit.lights[1]->sd[2] / fit.lights[1]->white_balance[2]) /
+                             2.0;
+  EXPECT_NEAR(fit.white_balance_sd[2], fit.white_balance[2] * relative_sd, 1e-12);
   for (const ChannelLinearity& channel : fit.linearity.rgb) {
     EXPECT_FALSE(channel.departs);
     EXPECT_GT(channel.linear_to_dn, 0.8 * 15000.0);
     EXPECT_LT(channel.linear_from_dn, 512.0 + 60.0);
+    EXPECT_GT(channel.linear_from_dn, 512.0);
   }
 }
 
@@ -93,6 +98,9 @@ TEST(ResponseFit, FindsWhereASensorBendsAndStopsThere) {
   for (const ChannelLinearity& channel : fit.linearity.rgb) {
     EXPECT_TRUE(channel.departs);
   }
+  // Noise and balance are of where it does not bend.
+  EXPECT_NEAR(fit.transfer->gain_dn_per_electron, 0.4, 0.006);
+  EXPECT_NEAR(fit.white_balance[0], 2.0, 0.003);
   // Slopes are of the first half of the range, in which it bends by 0.3 % on average.
   EXPECT_NEAR(fit.white_dn, 512.0 + 0.99 * 8000.0, 500.0);
   // A looser tolerance goes further: 3 % at 4000 (1 + sqrt 3).
@@ -149,6 +157,48 @@ TEST(ResponseFit, NoiseThatHidesTheRangeIsSaidSo) {
               HasSubstr("noise hides whether readings are proportional"));
 }
 
+// Saturated sites that differ by 20 sin: a median |deviation| of 14.1.
+TEST(ResponseFit, SaturationIsBelowAllSaturatedSites) {
+  Bench bench;
+  bench.bend = [](double dn) { return dn > 14000.0 ? 14000.0 + 20.0 * std::sin(dn) : dn; };
+  const ResponseFit fit = MustFit(bench);
+  ASSERT_TRUE(fit.saturation_dn);
+  EXPECT_NEAR(*fit.saturation_dn, 512.0 + 14000.0 - 3.0 * 1.4826 * 14.1, 5.0);
+}
+
+TEST(ResponseFit, TheColourThatSaturatesFirstIsWhite) {
+  Bench bench;
+  bench.times_s.push_back(0.08);  // saturates red too
+  for (size_t first = 0; first < 3; ++first) {
+    ChartReadings readings = bench.Readings();
+    for (ChartFrame& frame : readings.frames) {
+      for (std::vector<uint16_t>& dn : frame.dn) {
+        for (size_t i = 0; i < dn.size(); ++i) {
+          const bool is_first = readings.patches[0].colour[i] == first;
+          dn[i] = std::min(dn[i], static_cast<uint16_t>(is_first ? 14000 : 15000));
+        }
+      }
+    }
+    const Result<ResponseFit> fit = FitResponse(readings);
+    ASSERT_TRUE(fit) << fit.error().message;
+    EXPECT_EQ(fit->saturation_dn, 14000.0) << first;
+    EXPECT_EQ(fit->white_dn, 14000.0) << first;
+  }
+}
+
+// A light of one exposure agrees with itself whatever the sensor does.
+TEST(ResponseFit, OnlySeriesOfExposuresTellOfLinearity) {
+  const size_t alone = MustFit({.lights = 1}).linearity.points.size();
+  ChartReadings readings = Bench{.lights = 2}.Readings();
+  std::erase_if(readings.frames, [](const ChartFrame& frame) {
+    return frame.light == 1 && frame.exposure_s != 0.008;
+  });
+  const Result<ResponseFit> fit = FitResponse(readings);
+  ASSERT_TRUE(fit) << fit.error().message;
+  EXPECT_EQ(fit->linearity.points.size(), alone);
+  EXPECT_TRUE(fit->lights[1]);
+}
+
 TEST(ResponseFit, AmbientLightGrowsWithTimeAndIsTakenOff) {
   const ResponseFit fit = MustFit({.ambient_dn_per_s = 50000.0});
   EXPECT_NEAR(fit.black_dn, 512.0, 0.3);
@@ -164,6 +214,7 @@ TEST(ResponseFit, WhatTheLightDoesOnTheChartDoesNotMatter) {
     return 0.3 + 0.2 * static_cast<double>(patch) + 0.002 * x - 0.001 * y;
   };
   const ResponseFit fit = MustFit(bench);
+  EXPECT_THAT(fit.uneven, ::testing::IsEmpty());
   EXPECT_NEAR(fit.white_balance[0], 2.0, 0.002);
   EXPECT_NEAR(fit.white_balance[2], 1.0 / 0.7, 0.0015);
   EXPECT_NEAR(fit.transfer->gain_dn_per_electron, 0.4, 0.008);
@@ -183,7 +234,11 @@ TEST(ResponseFit, AFrameOfAnotherExposureIsNamed) {
   ChartReadings readings = Bench().Readings();
   std::swap(readings.frames[4].dn, readings.frames[2].dn);  // 4 ms under 2 ms
   EXPECT_THAT(ErrorOf(readings), HasSubstr("times as bright as its"));
-  EXPECT_THAT(ErrorOf(readings), HasSubstr("s are; are frames swapped"));
+  EXPECT_THAT(ErrorOf(readings),
+              ::testing::AnyOf(HasSubstr("its 0.002 s say by"), HasSubstr("its 0.004 s say by")));
+  EXPECT_THAT(ErrorOf(readings),
+              ::testing::AnyOf(HasSubstr("as bright as 0.002 s are; are frames swapped"),
+                               HasSubstr("as bright as 0.004 s are; are frames swapped")));
 }
 
 TEST(ResponseFit, FlickerIsWarnedOf) {
@@ -194,15 +249,18 @@ TEST(ResponseFit, FlickerIsWarnedOf) {
 }
 
 TEST(ResponseFit, AnUnevenPatchIsLeftOutAndNamed) {
-  Bench bench;
-  bench.shading = [](size_t patch, int x, int y) {
-    return patch == 2 && x < 6 && y < 6 ? 0.8 : 1.0;  // a speck of dust
-  };
-  const ResponseFit fit = MustFit(bench);
-  ASSERT_EQ(fit.uneven.size(), 1U);
-  EXPECT_EQ(fit.uneven[0].patch, 2U);
-  EXPECT_THAT(fit.warnings, ::testing::Contains(HasSubstr("patch 'p2' is uneven by")));
-  EXPECT_EQ(fit.lights[0]->patches, kReflectance.size() - 1);
+  for (const size_t dusty : {size_t{0}, size_t{2}}) {  // the first is saturated in many frames
+    Bench bench;
+    bench.shading = [&](size_t patch, int x, int y) {
+      return patch == dusty && x < 6 && y < 6 ? 0.8 : 1.0;  // a speck of dust
+    };
+    const ResponseFit fit = MustFit(bench);
+    ASSERT_EQ(fit.uneven.size(), 1U) << dusty;
+    EXPECT_EQ(fit.uneven[0].patch, dusty);
+    EXPECT_THAT(fit.warnings,
+                ::testing::Contains(HasSubstr(fmt::format("patch 'p{}' is uneven by", dusty))));
+    EXPECT_EQ(fit.lights[0]->patches, kReflectance.size() - 1);
+  }
 }
 
 TEST(ResponseFit, ASensorThatCutsOffBelowBlackIsWarnedOf) {
