@@ -249,9 +249,9 @@ Rgb8 RatioPicture(const CalibrationCheck& result, size_t sheet, const CheckedShe
         panel[c].pixels[static_cast<size_t>(view.blocks[k][j])] = colour[c];
       }
     }
-    panels.push_back(
-        Captioned(Enlarged(panel, kRatioPanelPx / view.columns),
-                  fmt::format("{}: red +{:g} %", result.rig.lights[k].name, 100.0 * kShown)));
+    panels.push_back(Captioned(Enlarged(panel, kRatioPanelPx / view.columns),
+                               fmt::format("{}: {}, +-{:g} %", result.rig.lights[k].name,
+                                           Name(result.check.lights[k].verdict), 100.0 * kShown)));
   }
   return ContactSheet(panels, kColumns);
 }
