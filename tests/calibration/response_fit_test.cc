@@ -106,7 +106,10 @@ TEST(ResponseFit, FindsWhereASensorBendsAndStopsThere) {
   // A looser tolerance goes further: 3 % at 4000 (1 + sqrt 3).
   ResponseFitOptions loose;
   loose.linearity.tolerance = 0.03;
-  EXPECT_NEAR(MustFit(bench, loose).white_dn, 512.0 + 0.97 * 10928.0, 500.0);
+  const ResponseFit further = MustFit(bench, loose);
+  EXPECT_NEAR(further.white_dn, 512.0 + 0.97 * 10928.0, 500.0);
+  EXPECT_NEAR(further.transfer->gain_dn_per_electron, 0.4, 0.006);
+  EXPECT_NEAR(further.white_balance[0], 2.0, 0.003);
 }
 
 // Off by 0.05 ((dn - 9000) / 9000)^2 from 9000 on: by 0.2 % at 10800, by 1 % at 13025. Exposures a
@@ -155,6 +158,18 @@ TEST(ResponseFit, NoiseThatHidesTheRangeIsSaidSo) {
   Bench bench{.gain = 400.0, .repeats = 1};
   EXPECT_THAT(ErrorOf(bench.Readings()),
               HasSubstr("noise hides whether readings are proportional"));
+}
+
+// Below 200 DN it loses three tenths; 1 % at 580.
+TEST(ResponseFit, BalanceIsOfWhereTheSensorIsLinear) {
+  Bench bench;
+  bench.bend = [](double dn) {
+    return dn < 200.0 ? 0.7 * dn : dn - 60.0 * std::exp((200.0 - dn) / 150.0);
+  };
+  const ResponseFit fit = MustFit(bench);
+  EXPECT_NEAR(fit.linearity.rgb[1].linear_from_dn, 512.0 + 580.0, 150.0);
+  EXPECT_NEAR(fit.white_balance[0], 2.0, 0.004);
+  EXPECT_NEAR(fit.white_balance[2], 1.0 / 0.7, 0.003);
 }
 
 // Saturated sites that differ by 20 sin: a median |deviation| of 14.1.
@@ -252,7 +267,8 @@ TEST(ResponseFit, AnUnevenPatchIsLeftOutAndNamed) {
   for (const size_t dusty : {size_t{0}, size_t{2}}) {  // the first is saturated in many frames
     Bench bench;
     bench.shading = [&](size_t patch, int x, int y) {
-      return patch == dusty && x < 6 && y < 6 ? 0.8 : 1.0;  // a speck of dust
+      const double speck = patch == dusty && x < 6 && y < 6 ? 0.8 : 1.0;  // of dust
+      return speck * (1.0 + 0.004 * x - 0.003 * y);
     };
     const ResponseFit fit = MustFit(bench);
     ASSERT_EQ(fit.uneven.size(), 1U) << dusty;
