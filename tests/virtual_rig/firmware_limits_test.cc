@@ -98,6 +98,19 @@ TEST_F(FirmwareLimits, CommandsOverAndOverDoNotStretchTheOnTime) {
   EXPECT_EQ(talk_->Light(5, 1000, 300).result, SATEEN_RESULT_DONE);
 }
 
+TEST_F(FirmwareLimits, EachTimeOnHasTheWholeLimit) {
+  Limit(5, 1000, 300);
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_EQ(talk_->Light(5, 1000, 250).lit, 1 << 5);
+    board_->RunFor(milliseconds(240));
+    EXPECT_THAT(board_->Lit(), ElementsAre(5));
+    EXPECT_LT(talk_->Status().lit_ms, 245);
+    board_->RunFor(milliseconds(20));
+    EXPECT_THAT(board_->Lit(), IsEmpty());
+  }
+  EXPECT_EQ(talk_->Status().fault, SATEEN_FAULT_NONE);
+}
+
 TEST_F(FirmwareLimits, OneLightAtATimeUnlessConfiguredOtherwise) {
   talk_->Light(0, 400, 3000);
   EXPECT_EQ(talk_->Light(1, 400, 3000, /*add=*/true).result, SATEEN_RESULT_TOO_MANY_LIT);
