@@ -37,9 +37,10 @@ TEST(CalibrateLens, NoiselessViewsGiveTheLensBack) {
 }
 
 struct Errors {
-  double focal = 0.0;         // relative, worst of fx and fy over the runs
-  double principal_px = 0.0;  // worst of cx and cy
-  double over_sd = 0.0;       // root mean square of the four errors over their standard deviations
+  double distortion_over_sd = 0.0;  // of the five terms of distortion, as over_sd
+  double focal = 0.0;               // relative, worst of fx and fy over the runs
+  double principal_px = 0.0;        // worst of cx and cy
+  double over_sd = 0.0;    // root mean square of the four errors over their standard deviations
   double corner_px = 0.0;  // of the displacement by distortion, root mean square over the corners
   double corner_sd_px = 0.0;  // what the fits say of that, the worst corner
 };
@@ -61,6 +62,10 @@ Errors ErrorsOf(const Camera& truth, const BoardSpec& board, double distance_mm)
     errors.focal = std::max(errors.focal, off.head<2>().abs().maxCoeff() / truth.fx);
     errors.principal_px = std::max(errors.principal_px, off.tail<2>().abs().maxCoeff());
     errors.over_sd += (off / sd).square().mean() / kRuns;
+    for (size_t i = 0; i < 5; ++i) {
+      const double term_off = fit.camera.distortion[i] - truth.distortion[i];
+      errors.distortion_over_sd += std::pow(term_off / fit.distortion_sd[i], 2) / (5.0 * kRuns);
+    }
     for (const double x : {0.0, truth.size_px.width - 1.0}) {
       for (const double y : {0.0, truth.size_px.height - 1.0}) {
         const Eigen::Vector2d moved = *PixelOfPinholePixel(fit.camera, x, y);
@@ -71,10 +76,13 @@ Errors ErrorsOf(const Camera& truth, const BoardSpec& board, double distance_mm)
     errors.corner_sd_px += fit.corner_sd_px * fit.corner_sd_px / kRuns;
   }
   errors.over_sd = std::sqrt(errors.over_sd);
+  errors.distortion_over_sd = std::sqrt(errors.distortion_over_sd);
+  EXPECT_NEAR(errors.distortion_over_sd, 1.0, 0.5);
   errors.corner_px = std::sqrt(errors.corner_px);
   errors.corner_sd_px = std::sqrt(errors.corner_sd_px);
-  fmt::print("distortion in the corners off by {:.3f} px, +- {:.3f} in the worst\n",
-             errors.corner_px, errors.corner_sd_px);
+  fmt::print(
+      "distortion: errors / sd {:.2f}; in the corners off by {:.3f} px, +- {:.3f} in the worst\n",
+      errors.distortion_over_sd, errors.corner_px, errors.corner_sd_px);
   // The worst of four of a few lenses: as large as the mean error or a little larger.
   EXPECT_LT(errors.corner_px, 1.3 * errors.corner_sd_px);
   EXPECT_GT(errors.corner_px, 0.3 * errors.corner_sd_px);
