@@ -26,6 +26,12 @@ TEST(CalibrateLens, NoiselessViewsGiveTheLensBack) {
   const Camera truth = LensOf3000Px();
   const LensFit fit =
       CalibrateLens(TiltedViews(truth, Charuco(), 20, 0.0, 1), truth.size_px).value();
+  // The views are turned by 20 degrees each, and tilted about axes 75 degrees apart.
+  for (size_t i = 0; i < fit.views.size(); ++i) {
+    const auto count = static_cast<double>(i);
+    const Eigen::Isometry3d pose = CameraFromBoard(20.0 * count, 35.0, 75.0 * count, {0, 0, 0});
+    EXPECT_LT((fit.views[i].normal_in_camera - pose.linear().col(2)).norm(), 1e-3) << i;
+  }
 
   EXPECT_LT(fit.rms_px, 1e-3);  // corners are floats in OpenCV
   EXPECT_NEAR(fit.camera.fx, truth.fx, 0.05);
