@@ -46,9 +46,10 @@ if(NOT TARGET OpenImageIO::OpenImageIO)
   add_library(OpenImageIO::OpenImageIO ALIAS PkgConfig::OpenImageIO)
 endif()
 
-# What the program uses and the libraries do not.
+# What the programs use and the libraries do not.
 if(NOT "${CMAKE_FIND_PACKAGE_NAME}" STREQUAL "sateen")
   find_package(CLI11 2.1 REQUIRED)
+  sateen_find_pkg_config(libgphoto2 libgphoto2>=2.5.28)
 endif()
 
 # For the virtual rig alone, because it is GPL-3. Not by pkg-config: Debian's file wants libelf-dev.

@@ -1,0 +1,45 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace sateen::ptp {
+
+// A setting of the virtual camera, as PTP's device properties are.
+struct Property {
+  uint16_t code = 0;
+  size_t size = 2;  // of its value: UINT8, UINT16 or UINT32 [bytes]
+  bool writable = true;
+  uint64_t value = 0;
+  std::vector<uint64_t> choices;  // any value, where empty
+
+  // The dataset that GetDevicePropDesc returns.
+  [[nodiscard]] std::string Description() const;
+};
+
+// What the virtual camera gives itself out for.
+struct Persona {
+  std::string name;
+  std::string manufacturer;
+  std::string model;
+  uint32_t vendor_extension = 0;
+  bool polled_events = false;  // Nikon: the host asks for events
+  std::vector<uint16_t> operations;
+  std::vector<Property> properties;
+  // The one that the exposure is taken from, and how.
+  uint16_t exposure_property = 0;
+  std::string folder;       // of its files, below DCIM
+  std::string file_prefix;  // "SCAN" of SCAN0001.DNG
+
+  [[nodiscard]] std::string DeviceInfo() const;
+  // Of the exposure property's value: 0.1 ms units, or a ratio of two 16-bit numbers. [s]
+  [[nodiscard]] double ExposureSeconds(uint64_t value) const;
+};
+
+// "generic": PTP's own properties. "nikon": a D5100, by what such a camera says of itself.
+[[nodiscard]] std::optional<Persona> PersonaNamed(std::string_view name);
+
+}  // namespace sateen::ptp
