@@ -17,6 +17,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr double kOtherScale = 50.0;
 constexpr BlockGrid kGrid = {.columns = 48, .rows = 32};
 
 // The dark frame over the dimmest light that is lit, in the channel where that is most.
@@ -54,6 +55,9 @@ class RigChecker {
       return tl::unexpected(check.error());
     }
     result_.check = std::move(*check);
+    if (Status status = CheckScale(); !status) {
+      return tl::unexpected(status.error());
+    }
     SayWhatIsWrong(args_, result_);
     result_.seconds =
         std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -105,6 +109,18 @@ class RigChecker {
                         .samples = std::move(sheet->samples),
                         .blocks = std::move(sheet->blocks)});
       result_.rig = std::move(sheet->rig);
+    }
+    return {};
+  }
+
+  // Lights by the ruler, whose fluxes are numbers of anyone's choice.
+  [[nodiscard]] Status CheckScale() const {
+    const Eigen::Vector3d& flux = result_.check.common_flux;
+    if (flux.maxCoeff() > kOtherScale || flux.minCoeff() < 1.0 / kOtherScale) {
+      return Fail(ErrorCode::kBadData,
+                  "{}: today's flux is {:.3g} times that of the rig: its lights are of another "
+                  "exposure, or were never calibrated; run sateen calibrate lights",
+                  args_.rig.empty() ? args_.sheets[0].string() : args_.rig.string(), flux[1]);
     }
     return {};
   }

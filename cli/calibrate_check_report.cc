@@ -84,9 +84,12 @@ void SaySheets(const CalibrateCheckArgs& args, CalibrationCheck& result) {
     const double spoilt = 100.0 * (sheet.spots + sheet.folds);
     if (spoilt > 0.2) {
       const std::string words = fmt::format(
-          "{}: {:.1f} % of the field has spots or no paper and {:.1f} % folds{}; left out", where,
+          "{}: {:.1f} % of the field has spots or no paper and {:.1f} % folds{}; left out{}", where,
           100.0 * sheet.spots, 100.0 * sheet.folds,
-          sheet.folds > 0.0 ? fmt::format(" up to {:.1f} degrees", sheet.steepest_deg) : "");
+          sheet.folds > 0.0 ? fmt::format(" up to {:.1f} degrees", sheet.steepest_deg) : "",
+          args.border.empty() && spoilt > args.options.max_spoilt_percent
+              ? "; another sheet, or name a printed border with --border"
+              : "");
       (spoilt > args.options.max_spoilt_percent ? result.faults : result.notes).push_back(words);
     }
   }

@@ -177,8 +177,9 @@ class LightsCalibrator {
       if (other != k && (nearest(other) != other || fitted_apart_mm < kOneLamp * apart_mm)) {
         return Fail(ErrorCode::kBadData,
                     "the frame of light '{}' is lit from where light '{}' is expected, {:.0f} mm "
-                    "from its own place: are frames or cables swapped, or one frame there twice?",
-                    rough[k].name, rough[other].name, result_.lights[k].moved_mm);
+                    "from its own place: are frames or cables swapped, or one frame there twice{}?",
+                    rough[k].name, rough[other].name, result_.lights[k].moved_mm,
+                    args_.border.empty() ? ", or is a border printed on the sheet (--border)" : "");
       }
     }
     return {};
@@ -291,8 +292,9 @@ class LightsCalibrator {
       if (share > kManyLeftOut) {
         result_.warnings.push_back(
             fmt::format("light '{}': {:.0f} % of the sheet does not follow the light and is left "
-                        "out; look for folds, dust, shadows and the paper's edge",
-                        fit.light.name, 100.0 * share));
+                        "out; look for folds, dust, shadows and the paper's edge{}",
+                        fit.light.name, 100.0 * share,
+                        args_.border.empty() ? ", and name a printed border with --border" : ""));
       }
     }
     if (direction_deg > kPoorDirectionDeg || position_mm > kPoorPositionMm) {

@@ -106,10 +106,14 @@ int RunDevicesAmong(const DevicesArgs& args, std::vector<SerialPortInfo> ports,
     }
   }
   if (std::ranges::none_of(devices, &Device::is_board)) {
-    log << fmt::format(
-        "sateen devices: error: no LED board among {} serial ports; plug it in, upload the "
-        "firmware (make flash), or name its port with --port\n",
-        devices.size());
+    const bool was_asked =
+        std::ranges::any_of(devices, [](const Device& device) { return device.port.may_be_board; });
+    log << (was_asked
+                ? std::string("sateen devices: error: no LED board answered; mend what is said of "
+                              "each port above, or upload the firmware (make flash)\n")
+                : fmt::format("sateen devices: error: no LED board among {} serial port{}; plug it "
+                              "in, or name its port with --port\n",
+                              devices.size(), devices.size() == 1 ? "" : "s"));
     return ExitStatus({ErrorCode::kDevice, ""});
   }
   return 0;

@@ -130,8 +130,8 @@ Status TurnOn(const LightArgs& args, int channel, LightBoard& board, const Task&
   if (!lit->cancelled && args.on_time.empty()) {
     return Fail(
         ErrorCode::kDevice,
-        "light {} went off after {}, the longest that it may be on; 'sateen light limits {} "
-        "--max-on 60s' allows more",
+        "light {} went off after {}, the longest that it may be on; if the LED bears more on its "
+        "heat sink, raise that by 'sateen light limits {} --max-on TIME'",
         args.what, DurationText(on_time), args.what);
   }
   out << fmt::format("light {} off\n", args.what);
@@ -254,7 +254,8 @@ void AddLight(CLI::App& root, LightArgs& args) {
                   "limit; 'off': all lights; 'status'; 'limits'")
       ->required();
   cmd->add_option("target", args.target, "Of limits: number or name of a light; default: all");
-  cmd->add_option("--level", args.level, "Level of the light, 0.1% to 100%")->capture_default_str();
+  cmd->add_option("--level", args.level, "Level of the light, 0% (off), 0.1% to 100%")
+      ->capture_default_str();
   cmd->add_option("--for", args.on_time, "Turn the light off after this long, as 500ms or 2s");
   cmd->add_option("--rig", args.rig, "Rig file in which names of lights are looked up");
   cmd->add_option("--port", args.port,

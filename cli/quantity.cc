@@ -31,11 +31,14 @@ Result<double> ParseLevel(std::string_view text) {
   const std::optional<Quantity> quantity = Split(text);
   if (quantity && (quantity->unit == "%" || quantity->unit.empty())) {
     const double level = quantity->unit.empty() ? quantity->value : quantity->value / 100.0;
+    if (quantity->unit.empty() && text == "1") {
+      return Fail(ErrorCode::kInvalidArgument, "level '1' may mean 1% or 100%; say which");
+    }
     if (level >= 0.0 && level <= 1.0) {
       return level;
     }
   }
-  return Fail(ErrorCode::kInvalidArgument, "level '{}'; needs 0% to 100%, or 0 to 1", text);
+  return Fail(ErrorCode::kInvalidArgument, "level '{}'; needs 0% to 100%, as 50% or 0.5", text);
 }
 
 Result<std::chrono::milliseconds> ParseDuration(std::string_view text) {

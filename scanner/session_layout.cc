@@ -90,8 +90,14 @@ std::vector<std::string> DifferencesOf(const Rig& given, const Rig& own) {
   }
   for (const Light& light : given.lights) {
     const auto other = std::ranges::find(own.lights, light.name, &Light::name);
-    if (other != own.lights.end() && light.model != LightModel::kDistant &&
-        other->model != LightModel::kDistant &&
+    const bool is_distant = light.model == LightModel::kDistant;
+    if (other != own.lights.end() && is_distant != (other->model == LightModel::kDistant)) {
+      differences.push_back(fmt::format("its light '{}' is {}distant, the session's is {}",
+                                        light.name, is_distant ? "" : "not ",
+                                        is_distant ? "near" : "distant"));
+      break;
+    }
+    if (other != own.lights.end() && !is_distant &&
         (light.position_mm - other->position_mm).norm() > kOtherPlaceMm) {
       differences.push_back(fmt::format("its light '{}' is {:.0f} mm from the session's",
                                         light.name,

@@ -184,7 +184,12 @@ class CommandReader {
   std::string text_;
 };
 
-int Serve(sateen::RigLoop& loop) {
+int Serve(sateen::RigLoop& loop, const sateen::RigLoop::Environment& environment) {
+  std::string exports = "export";
+  for (const auto& [name, value] : environment) {
+    exports += fmt::format(" {}='{}'", name, value);
+  }
+  std::cerr << exports << '\n';
   CommandReader commands;
   while (!sateen::InterruptFlag() && commands.Step(loop)) {
     loop.Step();
@@ -229,7 +234,7 @@ Result<int> Run(const Args& args) {
   sateen::RigLoop loop(**board, *port,
                        {.names = *names, .opening_resets = args.opening_resets, .events = events});
   loop.Start(firmware, *environment);
-  const int status = serve ? Serve(loop) : RunCommand(args, loop, *environment);
+  const int status = serve ? Serve(loop, *environment) : RunCommand(args, loop, *environment);
   loop.End();
   return status;
 }

@@ -182,9 +182,11 @@ TEST_F(SessionLayout, WarnsOfARigThatIsNotTheSessions) {
   given = own;
   given.camera->fx *= 0.8;
   given.camera->model = "b";
+  given.lights[0].model = LightModel::kDistant;
   EXPECT_THAT(warnings(given),
               ElementsAre(HasSubstr("its camera is 'b', the session's is 'a'"),
-                          HasSubstr("its focal length is 8 px, the session's is 10 px")));
+                          HasSubstr("its focal length is 8 px, the session's is 10 px"),
+                          HasSubstr("its light 'east' is distant, the session's is near")));
 }
 
 TEST_F(SessionLayout, ReadsMaskAndTruth) {
