@@ -216,8 +216,8 @@ TEST_F(CalibrateLensCommand, KeepsTheRestOfTheRigAndSaysWhatIsOutOfDate) {
   EXPECT_THAT(lens.log, Not(HasSubstr("is left out")));
   // A rig given with --rig that was never calibrated takes the place of one that was.
   fs::copy(Path("whole.json"), Path("replaced.json"));
-  const RunResult replaced = CalibrateLens({Path("boards"), "--board", kBoard, "--rig",
-                                            Path("true.json"), "-o", Path("replaced.json")});
+  const RunResult replaced = CalibrateLens(
+      {Path("boards"), "--board", kBoard, "--rig", Path("true.json"), "-o", Path("replaced.json")});
   ASSERT_EQ(replaced.exit_status, 0) << replaced.log;
   EXPECT_THAT(replaced.log, HasSubstr("the calibration of lights that"));
   EXPECT_EQ(after.camera->table_from_camera.matrix(), rig.camera->table_from_camera.matrix());

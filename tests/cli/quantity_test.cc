@@ -13,7 +13,8 @@ TEST(Quantity, ReadsLevels) {
   EXPECT_DOUBLE_EQ(*ParseLevel("100%"), 1.0);
   EXPECT_DOUBLE_EQ(*ParseLevel("0"), 0.0);
   EXPECT_DOUBLE_EQ(*ParseLevel("1.0"), 1.0);
-  for (const char* wrong : {"", "%", "50", "1", "101%", "-1%", "1.01", "50 %", "50%%", "nan", "inf"}) {
+  for (const char* wrong :
+       {"", "%", "50", "1", "101%", "-1%", "1.01", "50 %", "50%%", "nan", "inf"}) {
     ASSERT_FALSE(ParseLevel(wrong)) << wrong;
     EXPECT_EQ(ParseLevel(wrong).error().code, ErrorCode::kInvalidArgument);
   }
