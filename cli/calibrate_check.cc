@@ -17,7 +17,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kOtherScale = 50.0;
+constexpr double kNotItsScale = 50.0;
 constexpr BlockGrid kGrid = {.columns = 48, .rows = 32};
 
 // The dark frame over the dimmest light that is lit, in the channel where that is most.
@@ -116,7 +116,7 @@ class RigChecker {
   // Lights by the ruler, whose fluxes are numbers of anyone's choice.
   [[nodiscard]] Status CheckScale() const {
     const Eigen::Vector3d& flux = result_.check.common_flux;
-    if (flux.maxCoeff() > kOtherScale || flux.minCoeff() < 1.0 / kOtherScale) {
+    if (flux.maxCoeff() > kNotItsScale || flux.minCoeff() < 1.0 / kNotItsScale) {
       return Fail(ErrorCode::kBadData,
                   "{}: today's flux is {:.3g} times that of the rig: its lights are of another "
                   "exposure, or were never calibrated; run sateen calibrate lights",

@@ -126,7 +126,7 @@ TEST(ResponseFit, SaysUpToWhereSheetsMayBeExposed) {
   }
   // With a frame in the middle that is off its own time by more than what is asked, too.
   for (const double flicker : {1.0, 1.003}) {
-    bench.flicker = [&](size_t frame) { return frame == 13 ? flicker : 1.0; };
+    bench.flicker = [flicker](size_t frame) { return frame == 13 ? flicker : 1.0; };
     for (const ChannelLinearity& channel : MustFit(bench).linearity.rgb) {
       ASSERT_TRUE(channel.fine_to_dn);
       fmt::print("within 0.2 % up to {:.0f} DN (true: 11290), within 1 % up to {:.0f} (13407)\n",
