@@ -37,9 +37,7 @@ class ParseWatch {
   std::string problem_;
 };
 
-}  // namespace
-
-Result<Json> ParseJson(const std::string& text, const std::string& where) {
+Result<Json> Parse(const std::string& text, const std::string& where) {
   ParseWatch watch;
   try {
     Json value = Json::parse(text, std::ref(watch));
@@ -55,7 +53,7 @@ Result<Json> ParseJson(const std::string& text, const std::string& where) {
   }
 }
 
-Status TakeSchema(Json& file, const std::string& where, std::string_view name, int major) {
+Status CheckSchema(const Json& file, const std::string& where, std::string_view name, int major) {
   const std::string needed = fmt::format("{}/{}", name, major);
   if (!file.is_object()) {
     return Fail(ErrorCode::kBadData,
@@ -69,7 +67,6 @@ Status TakeSchema(Json& file, const std::string& where, std::string_view name, i
   }
   const std::string found = schema->is_string() ? schema->get<std::string>() : "";
   if (found == needed) {
-    file.erase(schema);
     return {};
   }
   if (found.starts_with(fmt::format("{}/", name))) {
@@ -82,6 +79,8 @@ Status TakeSchema(Json& file, const std::string& where, std::string_view name, i
               where, schema->dump(), needed);
 }
 
+}  // namespace
+
 Result<Json> ReadJsonFile(const std::filesystem::path& path, std::string_view schema_name,
                           int major) {
   const std::string where = path.string();
@@ -89,13 +88,14 @@ Result<Json> ReadJsonFile(const std::filesystem::path& path, std::string_view sc
   if (!text) {
     return tl::unexpected(text.error());
   }
-  Result<Json> file = ParseJson(*text, where);
+  Result<Json> file = Parse(*text, where);
   if (!file) {
     return file;
   }
-  if (Status status = TakeSchema(*file, where, schema_name, major); !status) {
+  if (Status status = CheckSchema(*file, where, schema_name, major); !status) {
     return tl::unexpected(status.error());
   }
+  file->erase("schema");
   return file;
 }
 
