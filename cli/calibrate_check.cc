@@ -17,7 +17,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kNotItsScale = 50.0;
+constexpr double kAnotherScale = 50.0;
 constexpr BlockGrid kGrid = {.columns = 48, .rows = 32};
 
 // The dark frame over the dimmest light that is lit, in the channel where that is most.
@@ -115,12 +115,18 @@ class RigChecker {
 
   // Lights by the ruler, whose fluxes are numbers of anyone's choice.
   [[nodiscard]] Status CheckScale() const {
-    const Eigen::Vector3d& flux = result_.check.common_flux;
-    if (flux.maxCoeff() > kNotItsScale || flux.minCoeff() < 1.0 / kNotItsScale) {
+    std::vector<double> ratios;
+    for (const std::vector<std::vector<double>>& of_sheet : result_.check.ratios) {
+      for (const std::vector<double>& of_light : of_sheet) {
+        ratios.insert(ratios.end(), of_light.begin(), of_light.end());
+      }
+    }
+    const double ratio = Median(std::move(ratios));
+    if (!(ratio < kAnotherScale && ratio > 1.0 / kAnotherScale)) {
       return Fail(ErrorCode::kBadData,
-                  "{}: today's flux is {:.3g} times that of the rig: its lights are of another "
-                  "exposure, or were never calibrated; run sateen calibrate lights",
-                  args_.rig.empty() ? args_.sheets[0].string() : args_.rig.string(), flux[1]);
+                  "{}: the sheets are {:.3g} times as bright as this rig says: its lights are of "
+                  "another exposure, or were never calibrated; run sateen calibrate lights",
+                  args_.rig.empty() ? args_.sheets[0].string() : args_.rig.string(), ratio);
     }
     return {};
   }

@@ -127,6 +127,22 @@ TEST_F(CalibrateCheckCommand, NamesADimLightAndABumpedOne) {
   EXPECT_EQ(Check("bad", {"--max-flux", "30", "--max-direction", "2"}).exit_status, 0);
 }
 
+// A rig by the ruler, whose fluxes are no measured ones.
+TEST_F(CalibrateCheckCommand, RefusesARigThatWasNeverCalibrated) {
+  std::ifstream file(folder_->Path() / "calibrated.json");
+  nlohmann::json ruler = nlohmann::json::parse(file);
+  for (nlohmann::json& light : ruler["lights"]) {
+    light["flux_rgb"] = {1, 1, 1};
+  }
+  WriteText(folder_->Path() / "ruler.json", ruler.dump());
+  const RunResult run = sateen::testing::RunCommand<cli::CalibrateCheckArgs>(
+      {"check", "--sheet", Path("clean"), "--rig", Path("ruler.json"), "-o", Path("never")},
+      cli::AddCalibrateCheck, cli::RunCalibrateCheck);
+  EXPECT_EQ(run.exit_status, 3);
+  EXPECT_THAT(run.log, HasSubstr("were never calibrated; run sateen calibrate lights"));
+  EXPECT_FALSE(fs::exists(Path("never")));
+}
+
 TEST_F(CalibrateCheckCommand, NamesAMovedCamera) {
   nlohmann::json rig = rig_;
   rig["camera"]["table_from_camera"][3] = 1.0;
