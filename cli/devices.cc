@@ -34,6 +34,45 @@ void Ask(Device& device, std::unique_ptr<BytePort> port) {
                             device.info.protocol, device.info.lights.size());
 }
 
+struct CameraReply {
+  UsbCamera found;
+  bool answers = false;
+  std::string what;  // what it said, or why it cannot be used
+  CameraInfo info;
+};
+
+// What a capture would meet.
+CameraReply Connect(const UsbCamera& found) {
+  CameraReply camera = {.found = found, .what = found.obstacle};
+  if (!camera.what.empty()) {
+    return camera;
+  }
+  const Result<std::unique_ptr<TetheredCamera>> made = MakeTetheredCamera(found.port);
+  const Result<CameraInfo> info =
+      made ? (*made)->Open() : Result<CameraInfo>(tl::unexpected(made.error()));
+  if (!info) {
+    camera.what = info.error().message;
+    return camera;
+  }
+  camera.answers = true;
+  camera.info = *info;
+  camera.what = fmt::format("camera {}, profile {}, ready to capture", info->model, info->profile);
+  return camera;
+}
+
+nlohmann::json ToJson(const CameraReply& camera) {
+  nlohmann::json json = {{"port", camera.found.port},
+                         {"description", camera.found.description},
+                         {"kind", "camera"},
+                         {"ready", camera.answers},
+                         {"what", camera.what}};
+  if (camera.answers) {
+    json["model"] = camera.info.model;
+    json["profile"] = camera.info.profile;
+  }
+  return json;
+}
+
 nlohmann::json ToJson(const Device& device) {
   nlohmann::json json = {
       {"port", device.port.name},
@@ -55,10 +94,14 @@ nlohmann::json ToJson(const Device& device) {
 void AddDevices(CLI::App& root, DevicesArgs& args) {
   CLI::App* cmd = root.add_subcommand(
       "devices",
-      "List the serial ports and ask those that may be an LED board what they are; "
-      "turns their lights off");
+      "List the serial ports and ask those that may be an LED board what they are, which turns "
+      "their lights off; list the cameras, connect to each, and say what is missing and how to "
+      "mend it");
   cmd->add_option("--port", args.port, "Ask this port too, whatever its USB id")
       ->envname("SATEEN_PORT");
+  cmd->add_option("--camera", args.camera,
+                  "Connect to this camera too: ptpip:ADDRESS, usb:BUS,DEVICE or folder:DIR")
+      ->envname("SATEEN_CAMERA");
   cmd->add_flag("--json", args.json, "Print JSON");
 }
 
@@ -69,12 +112,13 @@ int RunDevices(const DevicesArgs& args, const Task& task, std::ostream& out, std
     return ExitStatus(ports.error());
   }
   return RunDevicesAmong(args, ports ? *std::move(ports) : std::vector<SerialPortInfo>{},
-                         MakeSerialPort, task, out, log);
+                         MakeSerialPort, task, out, log, ListUsbCameras());
 }
 
 int RunDevicesAmong(const DevicesArgs& args, std::vector<SerialPortInfo> ports,
                     const std::function<std::unique_ptr<BytePort>(const std::string&)>& open,
-                    const Task& task, std::ostream& out, std::ostream& log) {
+                    const Task& task, std::ostream& out, std::ostream& log,
+                    const std::vector<UsbCamera>& found_cameras) {
   if (!args.port.empty()) {
     auto named = std::ranges::find(ports, args.port, &SerialPortInfo::name);
     if (named == ports.end()) {
@@ -93,16 +137,40 @@ int RunDevicesAmong(const DevicesArgs& args, std::vector<SerialPortInfo> ports,
       Ask(devices.back(), open(port.name));
     }
   }
+  std::vector<CameraReply> cameras;
+  cameras.reserve(found_cameras.size() + 1);
+  for (const UsbCamera& found : found_cameras) {
+    cameras.push_back(Connect(found));
+  }
+  if (!args.camera.empty() && std::ranges::none_of(found_cameras, [&](const UsbCamera& found) {
+        return found.port == args.camera;
+      })) {
+    cameras.push_back(Connect({.port = args.camera, .description = "named with --camera"}));
+  }
   if (args.json) {
     nlohmann::json json = {{"schema", "sateen.devices/1"}, {"devices", nlohmann::json::array()}};
     for (const Device& device : devices) {
       json["devices"].push_back(ToJson(device));
+    }
+    for (const CameraReply& camera : cameras) {
+      json["devices"].push_back(ToJson(camera));
     }
     out << json.dump(2) << '\n';
   } else {
     for (const Device& device : devices) {
       out << fmt::format("{:<14} {:<9} {}\n{:24} {}\n", device.port.name, UsbText(device.port),
                          device.port.description, "", device.what);
+    }
+  }
+  if (!args.json) {
+    for (const CameraReply& camera : cameras) {
+      out << fmt::format("{:<14} {:<9} {}\n{:24} {}\n", camera.found.port, "-",
+                         camera.found.description, "", camera.what);
+    }
+    if (cameras.empty()) {
+      out << fmt::format("{:<24} {}\n", "no camera",
+                         "none on USB: switch it on, use a cable with data lines; one on the "
+                         "network: --camera ptpip:ADDRESS");
     }
   }
   if (std::ranges::none_of(devices, &Device::is_board)) {

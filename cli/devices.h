@@ -8,12 +8,14 @@
 #include <vector>
 
 #include "core/task.h"
+#include "scanner/find_camera.h"
 #include "scanner/serial_port.h"
 
 namespace sateen::cli {
 
 struct DevicesArgs {
-  std::string port;  // asked too, whatever its USB id
+  std::string port;    // asked too, whatever its USB id
+  std::string camera;  // connected to, whatever is on USB
   bool json = false;
 };
 
@@ -21,9 +23,10 @@ void AddDevices(CLI::App& root, DevicesArgs& args);
 
 // Returns the exit status: 5 where no device answered.
 int RunDevices(const DevicesArgs& args, const Task& task, std::ostream& out, std::ostream& log);
-// The same over ports that a test gives.
+// The same over ports and cameras that a test gives; those without an obstacle are connected to.
 int RunDevicesAmong(const DevicesArgs& args, std::vector<SerialPortInfo> ports,
                     const std::function<std::unique_ptr<BytePort>(const std::string&)>& open,
-                    const Task& task, std::ostream& out, std::ostream& log);
+                    const Task& task, std::ostream& out, std::ostream& log,
+                    const std::vector<UsbCamera>& cameras = {});
 
 }  // namespace sateen::cli

@@ -4,6 +4,7 @@
 
 #include "tests/cli/cli_runner.h"
 #include "tests/scanner/fake_board.h"
+#include "tests/testing/files.h"
 
 namespace sateen {
 namespace {
@@ -58,10 +59,37 @@ TEST(Devices, NoBoardIsExitStatus5AndSaysWhatToDo) {
   const RunResult silent = Devices(fake, kPorts);
   EXPECT_EQ(silent.exit_status, 5);
   EXPECT_THAT(silent.out, HasSubstr("no greeting"));
+  EXPECT_THAT(silent.log, HasSubstr("no LED board answered"));
   EXPECT_THAT(silent.log, HasSubstr("make flash"));
   const RunResult none = Devices(fake, {});
   EXPECT_EQ(none.exit_status, 5);
   EXPECT_THAT(none.log, HasSubstr("no LED board among 0 serial ports"));
+}
+
+TEST(Devices, CamerasAreListedWithWhatIsMissing) {
+  FakeBoard fake;
+  const testing::TempFolder folder;
+  const std::string drop = "folder:" + folder.Path().string();
+  const nlohmann::json json = Devices(fake, kPorts, {"--camera", drop, "--json"}).Json();
+  ASSERT_EQ(json["devices"].size(), 3U);
+  EXPECT_EQ(json["devices"][2]["kind"], "camera");
+  EXPECT_EQ(json["devices"][2]["ready"], true);
+  EXPECT_EQ(json["devices"][2]["profile"], "folder");
+  const RunResult wrong = Devices(fake, kPorts, {"--camera", "dslr"});
+  EXPECT_EQ(wrong.exit_status, 0);
+  EXPECT_THAT(wrong.out, HasSubstr("'dslr' is no camera"));
+  EXPECT_THAT(Devices(fake, kPorts).out, HasSubstr("no camera"));
+  const auto with_obstacle = [&](const cli::DevicesArgs& args, const Task& task, std::ostream& out,
+                                 std::ostream& log) {
+    return cli::RunDevicesAmong(
+        args, kPorts, [&](const std::string&) { return std::make_unique<testing::FakePort>(fake); },
+        task, out, log,
+        {{.port = "usb:001,007", .description = "NIKON D5100", .obstacle = "held by gvfs"}});
+  };
+  const RunResult held =
+      testing::RunCommand<cli::DevicesArgs>({"devices"}, cli::AddDevices, with_obstacle);
+  EXPECT_THAT(held.out, HasSubstr("usb:001,007    -         NIKON D5100"));
+  EXPECT_THAT(held.out, HasSubstr("held by gvfs"));
 }
 
 }  // namespace
