@@ -8,6 +8,7 @@
 #include <array>
 #include <chrono>
 #include <cstdio>
+#include <filesystem>
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -72,8 +73,10 @@ int RoundTripHost(int count) {
 
 // Through libserialport, the pseudo terminal and the paced simulator, as `sateen` would.
 Status MeasureRoundTrips(const std::string& self, int count) {
-  char events[] = "/tmp/sateen-board-bench-XXXXXX";
-  const int descriptor = mkstemp(events);
+  std::error_code no_folder;
+  std::string events =
+      (std::filesystem::temp_directory_path(no_folder) / "sateen-board-bench-XXXXXX").string();
+  const int descriptor = mkstemp(events.data());
   if (descriptor < 0) {
     return Fail(sateen::ErrorCode::kIo, "no temporary file can be made");
   }
@@ -88,7 +91,7 @@ Status MeasureRoundTrips(const std::string& self, int count) {
   }
   const int status = pipe == nullptr ? -1 : pclose(pipe);
   const Result<std::string> text = sateen::ReadFileBytes(events);
-  std::remove(events);
+  std::remove(events.c_str());
   if (status != 0 || us.empty() || !text) {
     return Fail(sateen::ErrorCode::kDevice, "the virtual rig or its host failed: {}", command);
   }

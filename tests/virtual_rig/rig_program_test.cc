@@ -225,6 +225,13 @@ TEST(RigProgram, AKilledHostLeavesNoLightOn) {
   EXPECT_LT(off["time_s"].get<double>() - rig.WaitFor("light")["time_s"].get<double>(), 10.0);
 }
 
+TEST(RigProgram, SaysWhatToPasteIntoAnotherShell) {
+  const ShellResult result = Shell("echo quit | " + kRig);
+  EXPECT_EQ(result.exit_status, 0);
+  EXPECT_THAT(result.out, HasSubstr("export LD_PRELOAD='"));
+  EXPECT_THAT(result.out, HasSubstr("SATEEN_VIRTUAL_PORT='"));
+}
+
 TEST(RigProgram, CommandsActOnTheBoard) {
   const TempFolder folder;
   RunningRig rig(folder.Path());

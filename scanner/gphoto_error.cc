@@ -1,0 +1,49 @@
+#include "scanner/gphoto_error.h"
+
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+
+namespace sateen {
+namespace {
+
+using nlohmann::json;
+
+// libgphoto2's codes that a person has to be told something about.
+constexpr int kIoInProgress = -110;
+constexpr int kIoUsbClaim = -53;
+constexpr int kModelNotFound = -105;
+constexpr int kNoSpace = -115;
+constexpr int kIo = -7;
+constexpr int kUnspecified = -1;
+
+bool CardIsFull(const json& error) {
+  return error.value("code", 0) == kNoSpace ||
+         error.value("text", "").find("Store Full") != std::string::npos;
+}
+
+}  // namespace
+
+Error FromLibrary(const json& error, const std::string& port) {
+  const int code = error.value("code", 0);
+  const std::string text = error.value("text", "");
+  std::string remedy = "; see that it is on and connected";
+  if (code == kIoInProgress) {
+    remedy = "; it is busy: wait, or switch it off and on";
+  } else if (code == kIoUsbClaim) {
+    remedy = "; another program holds it: sateen devices says which";
+  } else if (code == kModelNotFound) {
+    remedy = "; no camera is there: sateen devices lists them";
+  } else if (CardIsFull(error)) {
+    remedy = "; the card is full: delete files or put in another";
+  }
+  return {ErrorCode::kDevice,
+          fmt::format("camera at {}: {}: {}{}", port, error.value("while", ""), text, remedy)};
+}
+
+bool ConnectionIsGone(const json& error) {
+  const int code = error.value("code", 0);
+  return code == kIo || (code <= -30 && code > -70) || (code == kUnspecified && !CardIsFull(error));
+}
+
+}  // namespace sateen
