@@ -73,6 +73,14 @@ class JsonReader {
   std::optional<Error> error_;
 };
 
+// Parses text. kBadData, with the place, for what is not JSON, for a key given twice and for deep
+// nesting; `where` opens the message.
+[[nodiscard]] Result<nlohmann::json> ParseJson(const std::string& text, const std::string& where);
+
+// Takes "schema" out of an object where it is "<name>/<major>"; kBadData where it is another or none.
+[[nodiscard]] Status TakeSchema(nlohmann::json& file, const std::string& where,
+                                std::string_view name, int major);
+
 // Parses a file whose top level is an object with "schema": "<name>/<major>" and returns it without
 // that key. kBadData for text that is not JSON (with the place), for a key given twice, for another
 // schema and for an unknown major version.

@@ -37,7 +37,9 @@ class ParseWatch {
   std::string problem_;
 };
 
-Result<Json> Parse(const std::string& text, const std::string& where) {
+}  // namespace
+
+Result<Json> ParseJson(const std::string& text, const std::string& where) {
   ParseWatch watch;
   try {
     Json value = Json::parse(text, std::ref(watch));
@@ -53,7 +55,7 @@ Result<Json> Parse(const std::string& text, const std::string& where) {
   }
 }
 
-Status CheckSchema(const Json& file, const std::string& where, std::string_view name, int major) {
+Status TakeSchema(Json& file, const std::string& where, std::string_view name, int major) {
   const std::string needed = fmt::format("{}/{}", name, major);
   if (!file.is_object()) {
     return Fail(ErrorCode::kBadData,
@@ -67,6 +69,7 @@ Status CheckSchema(const Json& file, const std::string& where, std::string_view 
   }
   const std::string found = schema->is_string() ? schema->get<std::string>() : "";
   if (found == needed) {
+    file.erase(schema);
     return {};
   }
   if (found.starts_with(fmt::format("{}/", name))) {
@@ -79,8 +82,6 @@ Status CheckSchema(const Json& file, const std::string& where, std::string_view 
               where, schema->dump(), needed);
 }
 
-}  // namespace
-
 Result<Json> ReadJsonFile(const std::filesystem::path& path, std::string_view schema_name,
                           int major) {
   const std::string where = path.string();
@@ -88,14 +89,13 @@ Result<Json> ReadJsonFile(const std::filesystem::path& path, std::string_view sc
   if (!text) {
     return tl::unexpected(text.error());
   }
-  Result<Json> file = Parse(*text, where);
+  Result<Json> file = ParseJson(*text, where);
   if (!file) {
     return file;
   }
-  if (Status status = CheckSchema(*file, where, schema_name, major); !status) {
+  if (Status status = TakeSchema(*file, where, schema_name, major); !status) {
     return tl::unexpected(status.error());
   }
-  file->erase("schema");
   return file;
 }
 

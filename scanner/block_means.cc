@@ -131,9 +131,14 @@ Result<BlockMeans> ReadBlockMeans(const FrameFile& file, const BlockGrid& grid) 
   if (IsRawName(file.path)) {
     means = ReadRawMosaic(file.path).and_then([&](const RawMosaic& mosaic) {
       return ReadingOf(file, mosaic).and_then([&](const SensorReading& reading) {
-        return Divide(file, mosaic.samples.Size(), grid, [&](Span columns, Span rows) {
-          return MeanOfMosaic(mosaic, reading, columns, rows, file.exposure);
-        });
+        return Divide(file, mosaic.samples.Size(), grid,
+                      [&](Span columns, Span rows) {
+                        return MeanOfMosaic(mosaic, reading, columns, rows, file.exposure);
+                      })
+            .map([&](BlockMeans divided) {
+              divided.exposure_s = mosaic.exposure_s;
+              return divided;
+            });
       });
     });
   } else {

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <optional>
+#include <string>
 #include <vector>
 
 #include "core/error.h"
@@ -28,6 +30,7 @@ struct BlockMeans {
   BlockGrid grid;
   std::vector<BlockMean> blocks;
   std::string sha256;
+  std::optional<double> exposure_s;  // where a camera RAW file says it
 
   // The middle of a block, and its outermost pixels. [px]
   [[nodiscard]] Eigen::Vector2d Center(int column, int row) const;

@@ -12,7 +12,8 @@
 namespace sateen {
 
 enum class SessionKind { kFabric, kSheet, kChart, kBoard };
-enum class FrameRole { kLit, kDark };
+// kRepeat: a light again, at the end, to see what drifted meanwhile. It is no part of the stack.
+enum class FrameRole { kLit, kDark, kRepeat };
 
 [[nodiscard]] std::string_view Name(SessionKind kind);
 [[nodiscard]] std::string_view Name(FrameRole role);
@@ -41,8 +42,8 @@ struct SessionFrame {
 ///      "rig": "../rig.json",                relative to the session's folder
 ///      "rig_sha256": "9f86...",             optional: 64 lower-case hexadecimal digits
 ///      "frames": [
-///        {"role": "lit",                    lit or dark
-///         "light": "led-0",                 name of the rig's light; lit frames only
+///        {"role": "lit",                    lit, dark or repeat
+///         "light": "led-0",                 name of the rig's light; not of a dark frame
 ///         "file": "frames/led-0.exr",       relative to the session's folder
 ///         "sha256": "60303...",             optional
 ///         "exposure_s": 0.0125,             optional, > 0; for every frame or for none
@@ -64,9 +65,12 @@ struct Session {
 /// Errors   kIo: absent or unreadable
 ///          kBadData: another schema, a key missing, unknown or out of range; only journal.jsonl
 ///          is there, so the capture was not completed
+[[nodiscard]] Result<Session> ReadSessionRecord(const std::filesystem::path& dir);
+
+// The same without its repeats, which are no part of what is solved.
 [[nodiscard]] Result<Session> ReadSession(const std::filesystem::path& dir);
 
-// The text of session.json; ReadSession gives the same value back.
+// The text of session.json; ReadSessionRecord gives the same value back.
 [[nodiscard]] std::string SessionToJson(const Session& session);
 
 }  // namespace sateen

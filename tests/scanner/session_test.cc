@@ -125,10 +125,11 @@ TEST(Session, RefusesEachKeyOfAFrameThatIsWrong) {
     EXPECT_THAT(FailureAfter([&](Json& j) { change(j["frames"][2]); }),
                 IsError(ErrorCode::kBadData, "frames[2]." + part));
   };
-  expect([](Json& f) { f["role"] = "dim"; }, "role is \"dim\"; need one of lit, dark");
+  expect([](Json& f) { f["role"] = "dim"; }, "role is \"dim\"; need one of lit, dark, repeat");
   expect([](Json& f) { f.erase("light"); }, "light is missing");
   expect([](Json& f) { f["light"] = ""; }, "light is empty");
   expect([](Json& f) { f["role"] = "dark"; }, "light is not known");  // a dark frame has no light
+  expect([](Json& f) { f["role"] = "repeat", f.erase("light"); }, "light is missing");
   expect([](Json& f) { f["file"] = ""; }, "file is empty");
   expect([](Json& f) { f["sha256"] = std::string(64, 'g'); }, "sha256 is no SHA-256");
   expect([](Json& f) { f["exposure_s"] = 0; }, "exposure_s is 0; need more than 0");

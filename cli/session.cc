@@ -1,0 +1,43 @@
+#include "cli/session.h"
+
+#include <nlohmann/json.hpp>
+#include <ostream>
+
+#include "scanner/capture_session.h"
+
+namespace sateen::cli {
+
+void AddSession(CLI::App& root, SessionVerifyArgs& args) {
+  CLI::App* session = root.add_subcommand("session", "Look after sessions on disk");
+  session->require_subcommand(1);
+  CLI::App* verify = session->add_subcommand(
+      "verify",
+      "Prove a session whole: its record, its journal and its rig agree, every light has its frame "
+      "and every file its hash; exit status 3 where not");
+  verify->add_option("session", args.session, "Folder of the session")->required();
+  verify->add_flag("--json", args.json, "Print JSON");
+}
+
+int RunSessionVerify(const SessionVerifyArgs& args, const Task& task, std::ostream& out,
+                     std::ostream& log) {
+  const Result<int> verified = VerifySession(args.session, task);
+  task.ClearProgress();
+  if (!verified) {
+    log << "sateen session verify: error: " << verified.error().message << '\n';
+    return ExitStatus(verified.error());
+  }
+  if (args.json) {
+    out << nlohmann::json{{"schema", "sateen.session.verify/1"},
+                          {"session", args.session.string()},
+                          {"files", *verified},
+                          {"whole", true}}
+               .dump(2)
+        << '\n';
+  } else {
+    out << fmt::format("{} is whole: {} files are as they were captured\n", args.session.string(),
+                       *verified);
+  }
+  return 0;
+}
+
+}  // namespace sateen::cli

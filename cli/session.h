@@ -1,0 +1,23 @@
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <filesystem>
+#include <iosfwd>
+
+#include "core/task.h"
+
+namespace sateen::cli {
+
+// `sateen session verify`.
+struct SessionVerifyArgs {
+  std::filesystem::path session;
+  bool json = false;
+};
+
+void AddSession(CLI::App& root, SessionVerifyArgs& args);
+
+// Returns the exit status.
+int RunSessionVerify(const SessionVerifyArgs& args, const Task& task, std::ostream& out,
+                     std::ostream& log);
+
+}  // namespace sateen::cli

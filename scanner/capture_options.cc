@@ -1,0 +1,41 @@
+#include "scanner/capture_options.h"
+
+namespace sateen {
+
+Status CaptureOptions::Validate() const {
+  using std::chrono::milliseconds;
+  const auto in = [](milliseconds time, milliseconds least, milliseconds most) {
+    return time >= least && time <= most;
+  };
+  if (!(level > 0.0 && level <= 1.0)) {
+    return Fail(ErrorCode::kInvalidArgument, "level is {}; need more than 0 and at most 1", level);
+  }
+  if (!(settings.exposure_s > 0.0 && settings.exposure_s <= 60.0)) {
+    return Fail(ErrorCode::kInvalidArgument, "exposure_s is {}; need more than 0 and at most 60",
+                settings.exposure_s);
+  }
+  if (!(settings.f_number > 0.0 && settings.iso > 0.0)) {
+    return Fail(ErrorCode::kInvalidArgument, "f_number is {} and iso {}; need more than 0",
+                settings.f_number, settings.iso);
+  }
+  if (!in(settle, milliseconds(0), milliseconds(10'000))) {
+    return Fail(ErrorCode::kInvalidArgument, "settle is {} ms; need 0 to 10000", settle.count());
+  }
+  if (!in(margin, milliseconds(1), milliseconds(60'000))) {
+    return Fail(ErrorCode::kInvalidArgument, "margin is {} ms; need 1 to 60000", margin.count());
+  }
+  if (deadline < milliseconds(1)) {
+    return Fail(ErrorCode::kInvalidArgument, "deadline is {} ms; need at least 1",
+                deadline.count());
+  }
+  if (!in(keep_alive, milliseconds(0), milliseconds(1500))) {
+    return Fail(ErrorCode::kInvalidArgument, "keep_alive is {} ms; need 0 to 1500",
+                keep_alive.count());
+  }
+  if (tries < 1) {
+    return Fail(ErrorCode::kInvalidArgument, "tries is {}; need at least 1", tries);
+  }
+  return checks.Validate();
+}
+
+}  // namespace sateen

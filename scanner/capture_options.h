@@ -1,0 +1,39 @@
+#pragma once
+
+#include <chrono>
+#include <filesystem>
+#include <functional>
+#include <string>
+
+#include "core/error.h"
+#include "scanner/frame_check.h"
+#include "scanner/session.h"
+#include "scanner/tethered_camera.h"
+
+namespace sateen {
+
+// How a session is captured. What decides about its frames is in the journal, and kept on resuming.
+struct CaptureOptions {
+  SessionKind kind = SessionKind::kFabric;
+  ExposureSettings settings;
+  // Of each light, (0, 1].
+  double level = 1.0;
+  // From a light's going on to the exposure; 0 ms to 10 s.
+  std::chrono::milliseconds settle{30};
+  // How much longer than the exposure a light may stay on: until the camera has delivered. 1 ms to
+  // 60 s; no longer than the board allows a light.
+  std::chrono::milliseconds margin{6000};
+  // Longest wait for a frame beyond its exposure; at least 1 ms.
+  std::chrono::milliseconds deadline{30'000};
+  // How often the board is spoken to while the camera exposes, so that it keeps the light on, in a
+  // thread of its own; less than its 2 s of silence. 0: never, for a board in simulated time.
+  std::chrono::milliseconds keep_alive{400};
+  // How often a frame is taken in all before its failure ends the capture; at least 1.
+  int tries = 3;
+  FrameCheckOptions checks;
+
+  // Names the first field out of range, with its value and its range.
+  [[nodiscard]] Status Validate() const;
+};
+
+}  // namespace sateen

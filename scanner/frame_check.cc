@@ -1,0 +1,335 @@
+#include "scanner/frame_check.h"
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <numeric>
+
+namespace sateen {
+namespace {
+
+constexpr double kDoubled = 1.4;  // a level from which on another light may be on too
+
+using Field = std::vector<double>;  // one value a block
+
+Field BrightnessOf(const FrameLook& look) {
+  Field field;
+  field.reserve(look.means.blocks.size());
+  for (const BlockMean& block : look.means.blocks) {
+    field.push_back(block.radiance_rgb.sum());
+  }
+  return field;
+}
+
+double Sum(const Field& field) { return std::accumulate(field.begin(), field.end(), 0.0); }
+
+Field Less(Field field, const Field& other) {
+  std::ranges::transform(field, other, field.begin(), std::minus<>());
+  return field;
+}
+
+double Median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+bool LightsAreCalibrated(const Rig& rig) {
+  return !rig.calibration_json.empty() &&
+         nlohmann::json::parse(rig.calibration_json, nullptr, /*allow_exceptions=*/false)
+             .contains("lights");
+}
+
+class CaptureChecker {
+ public:
+  CaptureChecker(const Rig& rig, const CaptureLooks& looks, const FrameCheckOptions& options)
+      : rig_(rig), looks_(looks), options_(options) {
+    const Field dark = BrightnessOf(*looks.dark_first);
+    for (const FrameLook* look : looks.lit) {
+      signal_.push_back(Less(BrightnessOf(*look), dark));
+    }
+    Predict();
+  }
+
+  CaptureCheck Check() {
+    CheckAmbient();
+    check_.drift = Sum(Less(BrightnessOf(*looks_.repeat), BrightnessOf(*looks_.dark_first))) /
+                       Sum(signal_[0]) -
+                   1.0;
+    FindLevels();
+    if (!check_.faults.empty()) {
+      return std::move(check_);  // what every frame suffers from would look like faults of lights
+    }
+    CheckLevels();
+    CheckPatterns();
+    CheckShift();
+    if (check_.faults.empty() && std::abs(check_.drift) > options_.max_drift) {
+      check_.notes.push_back(fmt::format(
+          "light '{}' is {:+.1f} % brighter at the end than at the start; let the lights warm up",
+          rig_.lights[0].name, 100.0 * check_.drift));
+    }
+    return std::move(check_);
+  }
+
+ private:
+  // E of (1); of one everywhere where the rig does not say.
+  void Predict() {
+    const BlockMeans& means = looks_.lit[0]->means;
+    const bool has_pose = rig_.camera && rig_.camera->has_pose;
+    has_pattern_ = has_pose && std::ranges::any_of(rig_.lights, [](const Light& light) {
+                     return light.model != LightModel::kDistant;
+                   });
+    for (const Light& light : rig_.lights) {
+      Field field;
+      for (int row = 0; row < means.grid.rows; ++row) {
+        for (int column = 0; column < means.grid.columns; ++column) {
+          field.push_back(PredictAt(light, means.Center(column, row), has_pose));
+        }
+      }
+      predicted_.push_back(std::move(field));
+    }
+    if (!has_pattern_) {
+      check_.notes.emplace_back(
+          has_pose ? "the lights are distant ones, which look alike: swapped lights are not found"
+                   : "the rig has no pose of its camera: swapped lights are not found");
+    }
+  }
+
+  double PredictAt(const Light& light, const Eigen::Vector2d& px, bool has_pose) const {
+    if (!has_pose && light.model != LightModel::kDistant) {
+      return 1.0;
+    }
+    const std::optional<Eigen::Vector3d> x_mm =
+        has_pose ? TablePointOfPixel(*rig_.camera, px.x(), px.y()) : Eigen::Vector3d::Zero();
+    if (!x_mm) {
+      return 0.0;
+    }
+    const Incident incident = IncidentAt(light, *x_mm);
+    return incident.e_rgb.sum() * std::max(0.0, incident.l.z());
+  }
+
+  void CheckAmbient() {
+    std::vector<double> sums;
+    std::ranges::transform(signal_, std::back_inserter(sums), Sum);
+    const double change =
+        Sum(Less(BrightnessOf(*looks_.dark_last), BrightnessOf(*looks_.dark_first)));
+    check_.ambient = change / std::max(Median(sums), 1e-30);
+    if (std::abs(check_.ambient) > options_.max_ambient) {
+      check_.faults.push_back(
+          {.kind = CaptureFaultKind::kAmbient,
+           .text = fmt::format(
+               "ambient light has changed by {:+.1f} % of what the lights give, between the dark "
+               "frame at the start and the one at the end; at most {:.1f} % may be: keep the room "
+               "as it is, and capture every frame again",
+               100.0 * check_.ambient, 100.0 * options_.max_ambient)});
+    }
+  }
+
+  // A first light that is not what it should be cannot be laid over its repeat.
+  void CheckShift() {
+    const bool first_is_wrong = std::ranges::any_of(check_.faults, [](const CaptureFault& fault) {
+      return std::ranges::find(fault.lights, std::size_t{0}) != fault.lights.end();
+    });
+    if (first_is_wrong) {
+      return;
+    }
+    const Shift shift = ShiftBetween(looks_.lit[0]->middle, looks_.repeat->middle);
+    if (shift.peak < options_.min_shift_peak) {
+      check_.notes.emplace_back(
+          "too little texture to tell whether the camera has moved meanwhile");
+      return;
+    }
+    check_.shift = shift;
+    if (shift.px.norm() > options_.max_shift_px) {
+      check_.faults.push_back(
+          {.kind = CaptureFaultKind::kMoved,
+           .text = fmt::format(
+               "the picture has moved by {:.1f} px ({:+.1f} right, {:+.1f} down) between the first "
+               "frame of light '{}' and its second; at most {:g} px may be: make camera and fabric "
+               "fast, check the calibration, and capture every frame again",
+               shift.px.norm(), shift.px.x(), shift.px.y(), rig_.lights[0].name,
+               options_.max_shift_px)});
+    }
+  }
+
+  void FindLevels() {  // (2)
+    for (size_t k = 0; k < signal_.size(); ++k) {
+      check_.levels.push_back(Sum(signal_[k]) / std::max(Sum(predicted_[k]), 1e-30));
+    }
+    const double median = Median(check_.levels);
+    for (double& level : check_.levels) {
+      level /= std::max(median, 1e-30);
+    }
+  }
+
+  void AddFault(CaptureFaultKind kind, std::vector<size_t> lights, std::string text) {
+    check_.faults.push_back({.kind = kind, .lights = std::move(lights), .text = std::move(text)});
+  }
+
+  void CheckLevels() {
+    const double change =
+        LightsAreCalibrated(rig_) ? options_.max_level_change : options_.max_rough_level_change;
+    on_.assign(signal_.size(), true);
+    for (size_t k = 0; k < signal_.size(); ++k) {
+      const double level = check_.levels[k];
+      const std::string& name = rig_.lights[k].name;
+      if (!(level >= options_.min_level)) {  // also NaN
+        on_[k] = false;
+        AddFault(CaptureFaultKind::kDark, {k},
+                 fmt::format("light '{}' was not on: its frame has {:.0f} % of the light that the "
+                             "rig says; check its cable: sateen light {}",
+                             name, 100.0 * level, rig_.lights[k].channel));
+      } else if (level > kDoubled) {
+        on_[k] = false;
+      } else if (std::abs(level - 1.0) > change) {
+        AddFault(
+            CaptureFaultKind::kLevel, {k},
+            fmt::format("light '{}' has {:.0f} % of the light that the rig says, against the "
+                        "others; at most {:.0f} % may be between: check the light and what may "
+                        "shade it, or calibrate anew",
+                        name, 100.0 * level, 100.0 * change));
+      }
+    }
+    for (size_t k = 0; k < signal_.size(); ++k) {
+      if (check_.levels[k] > kDoubled) {
+        AddFault(CaptureFaultKind::kLevel, {k},
+                 fmt::format("light '{}' has {:.0f} % of the light that the rig says{}: more than "
+                             "one light was on; check the wiring of its channel {}",
+                             rig_.lights[k].name, 100.0 * check_.levels[k], SecondLight(k),
+                             rig_.lights[k].channel));
+      }
+    }
+  }
+
+  // Mean log of all lights that are on, block by block.
+  [[nodiscard]] Field MeanLog(const std::vector<Field>& all) const {
+    Field mean(all[0].size());
+    const auto share = 1.0 / static_cast<double>(std::ranges::count(on_, true));
+    for (size_t k = 0; k < all.size(); ++k) {
+      for (size_t b = 0; b < mean.size() && on_[k]; ++b) {
+        mean[b] += share * std::log(all[k][b]);
+      }
+    }
+    return mean;
+  }
+
+  // (3); not finite where a value is not above 0.
+  static Field Pattern(Field field, const Field& mean_log) {
+    std::ranges::transform(field, mean_log, field.begin(),
+                           [](double value, double mean) { return std::log(value) - mean; });
+    return field;
+  }
+
+  // (4), over the blocks where both are known.
+  static double Misfit(const Field& q, const Field& r) {
+    double sum = 0.0;
+    double sum2 = 0.0;
+    double count = 0.0;
+    for (size_t b = 0; b < q.size(); ++b) {
+      const double difference = q[b] - r[b];
+      if (std::isfinite(difference)) {
+        sum += difference;
+        sum2 += difference * difference;
+        count += 1.0;
+      }
+    }
+    return count > 0.0 ? sum2 / count - sum / count * (sum / count) : 0.0;
+  }
+
+  // ", as if light 'b' were on too", where the pattern tells.
+  [[nodiscard]] std::string SecondLight(size_t k) const {
+    if (!has_pattern_) {
+      return "";
+    }
+    const Field q = Pattern(signal_[k], MeanLog(signal_));
+    const Field mean_predicted = MeanLog(predicted_);
+    size_t best = k;
+    double least = 0.0;
+    for (size_t j = 0; j < predicted_.size(); ++j) {
+      Field both = predicted_[k];
+      std::ranges::transform(both, predicted_[j], both.begin(), std::plus<>());
+      const double misfit = Misfit(q, Pattern(both, mean_predicted));
+      if (j != k && (best == k || misfit < least)) {
+        best = j;
+        least = misfit;
+      }
+    }
+    return best == k ? "" : fmt::format(", as if light '{}' were on too", rig_.lights[best].name);
+  }
+
+  void CheckPatterns() {
+    if (!has_pattern_ || std::ranges::count(on_, true) < 2) {
+      return;
+    }
+    const Field mean_signal = MeanLog(signal_);
+    const Field mean_predicted = MeanLog(predicted_);
+    std::vector<Field> patterns;
+    for (const Field& field : predicted_) {
+      patterns.push_back(Pattern(field, mean_predicted));
+    }
+    for (size_t k = 0; k < signal_.size(); ++k) {
+      if (!on_[k]) {
+        continue;
+      }
+      const Field q = Pattern(signal_[k], mean_signal);
+      const double own = Misfit(q, patterns[k]);
+      size_t best = k;
+      double least = own;
+      for (size_t j = 0; j < patterns.size(); ++j) {
+        const double misfit = Misfit(q, patterns[j]);
+        if (misfit < least) {
+          best = j;
+          least = misfit;
+        }
+      }
+      if (best != k && least < options_.other_light_misfit * own) {
+        AddFault(
+            CaptureFaultKind::kOtherLight, {k},
+            fmt::format("the frame of light '{}' is lit from where the rig has light '{}'; are "
+                        "they swapped? Check the channels of both ({} and {})",
+                        rig_.lights[k].name, rig_.lights[best].name, rig_.lights[k].channel,
+                        rig_.lights[best].channel));
+      }
+    }
+  }
+
+  const Rig& rig_;
+  const CaptureLooks& looks_;
+  const FrameCheckOptions& options_;
+  bool has_pattern_ = false;
+  std::vector<Field> signal_;     // s of (1)
+  std::vector<Field> predicted_;  // E of (1)
+  std::vector<bool> on_;          // one light, alone
+  CaptureCheck check_;
+};
+
+}  // namespace
+
+Status FrameCheckOptions::Validate() const {
+  struct Range {
+    const char* name;
+    double value;
+    double most;
+  };
+  for (const auto& [name, value, most] :
+       {Range{"max_saturated", max_saturated, 1.0}, Range{"min_level", min_level, 1.0},
+        Range{"max_level_change", max_level_change, 1.0},
+        Range{"max_rough_level_change", max_rough_level_change, 1.0},
+        Range{"other_light_misfit", other_light_misfit, 1.0},
+        Range{"max_ambient", max_ambient, 1.0}, Range{"max_drift", max_drift, 1.0},
+        Range{"max_shift_px", max_shift_px, 100.0}, Range{"min_shift_peak", min_shift_peak, 1.0},
+        Range{"max_exposure_error", max_exposure_error, 1.0}}) {
+    if (!(value > 0.0 && value <= most)) {
+      return Fail(ErrorCode::kInvalidArgument, "{} is {}; need more than 0 and at most {:g}", name,
+                  value, most);
+    }
+  }
+  return {};
+}
+
+CaptureCheck CheckCapture(const Rig& rig, const CaptureLooks& looks,
+                          const FrameCheckOptions& options) {
+  return CaptureChecker(rig, looks, options).Check();
+}
+
+}  // namespace sateen

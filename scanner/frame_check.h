@@ -1,0 +1,112 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/error.h"
+#include "imaging/image.h"
+#include "rig/rig.h"
+#include "scanner/block_means.h"
+#include "scanner/capture_plan.h"
+#include "scanner/tethered_camera.h"
+
+namespace sateen {
+
+// What the checks of a capture ask for. Shares and changes are relative: 0.1 is 10 %.
+struct FrameCheckOptions {
+  // Most blocks of a frame that may hold a saturated site. (0, 1]
+  double max_saturated = 0.05;
+  // Least brightness of a light, of what the rig says against the other lights, to be on. (0, 1)
+  double min_level = 0.3;
+  // Most that a light may differ from that, where the rig's lights have been calibrated, and where
+  // they are only known by the ruler. (0, 1)
+  double max_level_change = 0.12;
+  double max_rough_level_change = 0.5;
+  // Another light explains a frame: its misfit is below this part of the own light's. (0, 1)
+  double other_light_misfit = 0.4;
+  // Most that the dark may change from first to last, of the lit frames' brightness. (0, 1)
+  double max_ambient = 0.01;
+  // Drift of the first light from which on it is a warning. (0, 1)
+  double max_drift = 0.03;
+  // How far the picture may have moved meanwhile. (0, 100] px
+  double max_shift_px = 1.0;
+  // Correlation of first frame and repeat below which a shift cannot be told. (0, 1)
+  double min_shift_peak = 0.1;
+  // Most that an exposure in a file may differ from the camera's word. (0, 1)
+  double max_exposure_error = 0.1;
+
+  // Names the first field out of range, with its value and its range.
+  [[nodiscard]] Status Validate() const;
+};
+
+// What the checks keep of a frame.
+struct FrameLook {
+  BlockMeans means;
+  // Middle of the picture for the shift: cells of 2 x 2 sites or pixels, at most 512 x 512 of them.
+  Image<float> middle;
+};
+
+/// Reads a frame and checks what can be told of it alone: it decodes, has the size of the rig's
+/// camera, the exposure that the camera confirmed where the file says one, and is not clipped.
+///
+/// `settings`  as the camera has them
+/// Errors      kIo; kBadData: what is wrong, and what to do
+[[nodiscard]] Result<FrameLook> CheckFrame(const FrameFile& file, const Rig& rig,
+                                           const ExposureSettings& settings, FrameRole role,
+                                           const FrameCheckOptions& options);
+
+enum class CaptureFaultKind { kDark, kLevel, kOtherLight, kAmbient, kMoved };
+
+struct CaptureFault {
+  CaptureFaultKind kind = CaptureFaultKind::kDark;
+  std::vector<std::size_t> lights;  // of the rig; empty: every frame is concerned
+  std::string text;                 // what was found, and what to do
+};
+
+// How far the second picture lies from the first, and how sure that is: the correlation there, 1 at most.
+struct Shift {
+  Eigen::Vector2d px = Eigen::Vector2d::Zero();
+  double peak = 0.0;
+};
+
+struct CaptureCheck {
+  std::vector<CaptureFault> faults;
+  std::vector<std::string> notes;  // what could not be told, and what is no fault
+  std::vector<double> levels;      // of each light, of what the rig says, over their median
+  double ambient = 0.0;            // change of the dark, of the lit frames' brightness
+  double drift = 0.0;              // of the first light
+  std::optional<Shift> shift;      // nothing where it cannot be told
+};
+
+// The frames of a capture, in the roles that they have for the checks.
+struct CaptureLooks {
+  std::vector<const FrameLook*> lit;  // of each light of the rig
+  const FrameLook* dark_first = nullptr;
+  const FrameLook* dark_last = nullptr;
+  const FrameLook* repeat = nullptr;  // of the first light
+};
+
+/// Whether the frames of a capture can be true, by comparing them with each other and with the rig:
+///
+///     s_kb = i_kb - dark_b,   E_kb = e_k (n . l_k) at the block's place on the table          (1)
+///     level_k = sum_b s_kb / sum_b E_kb,  over its median                 (2)
+///     q_kb = log s_kb - mean_j log s_jb,   r_kb = log E_kb - mean_j log E_jb                  (3)
+///     misfit_kj = var_b (q_kb - r_jb)                                                         (4)
+///
+/// The mean over lights in (3) takes the texture of a fabric out; it runs over the lights that are on,
+/// so that lights that have changed places do not disturb it. A light that is off has a level below
+/// min_level; two that are on together have one too high; lights that have changed places have the
+/// least misfit at another light than their own. Levels are only checked of a rig whose lights have
+/// been calibrated, patterns only where the camera has a pose and the lights are no distant ones.
+/// The dark at the end against the dark at the start tells of ambient light, the first light again of
+/// drift (its sum over blocks) and of a camera or a fabric that has moved (ShiftBetween).
+[[nodiscard]] CaptureCheck CheckCapture(const Rig& rig, const CaptureLooks& looks,
+                                        const FrameCheckOptions& options);
+
+/// Where the second picture lies against the first: the highest cross-correlation of both, less their
+/// Gaussian blur, over all shifts, and the top of the parabola through it and its neighbours.
+[[nodiscard]] Shift ShiftBetween(const Image<float>& first, const Image<float>& second);
+
+}  // namespace sateen

@@ -1,0 +1,69 @@
+#include "cli/session.h"
+
+#include <gmock/gmock.h>
+
+#include "core/sha256.h"
+#include "tests/cli/cli_runner.h"
+#include "tests/scanner/captures.h"
+
+namespace sateen {
+namespace {
+
+using ::testing::HasSubstr;
+using testing::RunResult;
+using testing::TempFolder;
+
+RunResult Verify(const std::vector<std::string>& words) {
+  std::vector<std::string> all = {"session", "verify"};
+  all.insert(all.end(), words.begin(), words.end());
+  return testing::RunCommand<cli::SessionVerifyArgs>(all, cli::AddSession, cli::RunSessionVerify);
+}
+
+// A session with the hashes of its frames.
+void WriteHashed(const std::filesystem::path& dir) {
+  Session session = testing::FourLightSession();
+  testing::WriteSession(dir, session);
+  for (SessionFrame& frame : session.frames) {
+    frame.sha256 = *Sha256OfFile(dir / frame.file);
+  }
+  testing::WriteText(dir / "session.json", SessionToJson(session));
+}
+
+TEST(SessionVerify, SaysThatItIsWhole) {
+  const TempFolder temp;
+  WriteHashed(temp.Path() / "linen");
+  const RunResult result = Verify({(temp.Path() / "linen").string()});
+  EXPECT_EQ(result.exit_status, 0) << result.log;
+  EXPECT_THAT(result.out, HasSubstr("linen is whole: 5 files"));
+  const RunResult json = Verify({(temp.Path() / "linen").string(), "--json"});
+  EXPECT_EQ(json.Json()["files"], 5);
+  EXPECT_EQ(json.Json()["whole"], true);
+}
+
+TEST(SessionVerify, ExitsWith3AndNamesWhatIsNot) {
+  const TempFolder temp;
+  const std::filesystem::path dir = temp.Path() / "linen";
+  const auto expect = [&](const std::string& part) {
+    const RunResult result = Verify({dir.string()});
+    EXPECT_EQ(result.exit_status, 3) << part;
+    EXPECT_EQ(result.out, "");
+    EXPECT_THAT(result.log, HasSubstr(part));
+  };
+  expect("session.json");  // no such folder
+  WriteHashed(dir);
+  testing::WriteFlat(dir / "frames" / "west.exr", 0.5F);
+  expect("west.exr: its SHA-256");
+  std::filesystem::remove(dir / "frames" / "west.exr");
+  expect("west.exr");
+  Session session = testing::FourLightSession();
+  testing::WriteText(dir / "session.json", SessionToJson(session));
+  expect("frames/east.exr has no hash");
+  session.frames.erase(session.frames.begin());
+  testing::WriteText(dir / "session.json", SessionToJson(session));
+  expect("has 0 frames of light 'east'");
+}
+
+TEST(SessionVerify, NeedsASession) { EXPECT_EQ(Verify({}).exit_status, 2); }
+
+}  // namespace
+}  // namespace sateen
