@@ -8,7 +8,8 @@
 #include <utility>
 
 #include "cli/calibrate_lights.h"
-#include "cli/scratch_folder.h"
+#include "cli/peak_memory.h"
+#include "core/scratch_folder.h"
 #include "cli/simulate.h"
 #include "cli/solve.h"
 #include "core/output_folder.h"

@@ -11,8 +11,10 @@
 #include "cli/bench_solve.h"
 #include "cli/board.h"
 #include "cli/calibrate.h"
+#include "cli/capture.h"
 #include "cli/devices.h"
 #include "cli/light.h"
+#include "cli/preview.h"
 #include "cli/session.h"
 #include "cli/simulate.h"
 #include "cli/solve.h"
@@ -40,6 +42,10 @@ int Run(int argc, char** argv) {
   sateen::cli::AddCalibrate(app, calibrate);
   sateen::cli::BoardPrintArgs board_print;
   sateen::cli::AddBoard(app, board_print);
+  sateen::cli::CaptureArgs capture;
+  sateen::cli::AddCapture(app, capture);
+  sateen::cli::PreviewArgs preview;
+  sateen::cli::AddPreview(app, preview);
   sateen::cli::LightArgs light;
   sateen::cli::AddLight(app, light);
   sateen::cli::DevicesArgs devices;
@@ -75,6 +81,10 @@ int Run(int argc, char** argv) {
     status = RunCalibrate(app, calibrate, task, std::cout, std::cerr);
   } else if (app.got_subcommand("board")) {
     status = RunBoardPrint(board_print, task, std::cout, std::cerr);
+  } else if (app.got_subcommand("capture")) {
+    status = RunCaptureCommand(capture, task, std::cout, std::cerr);
+  } else if (app.got_subcommand("preview")) {
+    status = RunPreview(preview, task, std::cout, std::cerr);
   } else if (app.got_subcommand("light")) {
     status = RunLight(light, task, std::cout, std::cerr);
   } else if (app.got_subcommand("devices")) {

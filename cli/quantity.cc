@@ -53,6 +53,26 @@ Result<std::chrono::milliseconds> ParseDuration(std::string_view text) {
               "time '{}'; needs a number with its unit, as 500ms or 2s, from 1ms to 3600s", text);
 }
 
+Result<double> ParseExposure(std::string_view text) {
+  const bool is_fraction = text.starts_with("1/");
+  const std::optional<Quantity> quantity = Split(is_fraction ? text.substr(2) : text);
+  if (quantity && (quantity->unit.empty() || quantity->unit == "s" ||
+                   (quantity->unit == "ms" && !is_fraction))) {
+    const double value = quantity->value * (quantity->unit == "ms" ? 1e-3 : 1.0);
+    const double exposure_s = is_fraction ? 1.0 / value : value;
+    if (exposure_s >= 1e-5 && exposure_s <= 60.0) {
+      return exposure_s;
+    }
+  }
+  return Fail(ErrorCode::kInvalidArgument,
+              "exposure '{}'; needs 1/100000 to 60 s, as 1/50, 20ms or 0.5s", text);
+}
+
+std::string ExposureText(double exposure_s) {
+  return exposure_s < 0.3 ? fmt::format("1/{:.4g} s", 1.0 / exposure_s)
+                          : fmt::format("{:.4g} s", exposure_s);
+}
+
 std::string DurationText(std::chrono::milliseconds time) {
   if (time < std::chrono::seconds(1)) {
     return fmt::format("{} ms", time.count());

@@ -15,6 +15,11 @@ namespace sateen::cli {
 // hour.
 [[nodiscard]] Result<std::chrono::milliseconds> ParseDuration(std::string_view text);
 
+// "1/50", "20ms", "0.5s" or "0.02", in seconds. kInvalidArgument: anything else, or not in 10 us to 60 s.
+[[nodiscard]] Result<double> ParseExposure(std::string_view text);
+// "1/50 s" below a third of a second, else "0.5 s".
+[[nodiscard]] std::string ExposureText(double exposure_s);
+
 // "500 ms" below a second, else "2 s" or "1.25 s".
 [[nodiscard]] std::string DurationText(std::chrono::milliseconds time);
 // "50 %" or "12.5 %".

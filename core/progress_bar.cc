@@ -10,9 +10,10 @@ namespace sateen {
 namespace {
 
 constexpr std::chrono::milliseconds kMinInterval{100};
-constexpr int kBarWidth = 30;
 constexpr size_t kNameWidth = 24;
-constexpr int kLineWidth = 63;  // name, bar and percentage; fits any terminal
+constexpr size_t kLongNameWidth = 46;
+constexpr size_t kNameAndBarWidth = 54;  // a longer name takes from the bar
+constexpr int kLineWidth = 63;           // name, bar and percentage; fits any terminal
 
 // A terminal that is gone is no reason to stop the work.
 void Write(int fd, const std::string& text) {
@@ -58,9 +59,11 @@ void ProgressBar::Advance(int steps) {
 void ProgressBar::Draw() {
   const int64_t total = std::max(1, total_);
   const int64_t done = std::clamp<int64_t>(done_, 0, total);
-  const std::string filled(static_cast<size_t>(kBarWidth * done / total), '#');
-  Write(fd_, fmt::format("\r{:{}.{}} [{:{}}] {:3} %", stage_, kNameWidth, kNameWidth, filled,
-                         kBarWidth, 100 * done / total));
+  const size_t name_width = std::clamp(stage_.size(), kNameWidth, kLongNameWidth);
+  const size_t bar_width = kNameAndBarWidth - name_width;
+  const std::string filled(bar_width * static_cast<size_t>(done) / static_cast<size_t>(total), '#');
+  Write(fd_, fmt::format("\r{:{}.{}} [{:{}}] {:3} %", stage_, name_width, name_width, filled,
+                         bar_width, 100 * done / total));
   drawn_at_ = std::chrono::steady_clock::now();
 }
 

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <optional>
+#include <string>
 
 #include "core/error.h"
 #include "imaging/image.h"
@@ -55,5 +56,8 @@ struct Photo {
                                const std::array<Image<uint8_t>, 3>& image);
 [[nodiscard]] Status WritePng16(const std::filesystem::path& path,
                                 const std::array<Image<uint16_t>, 3>& image);
+
+// The bytes of a JPEG file, sRGB, quality 90.
+[[nodiscard]] Result<std::string> EncodeJpeg(const std::array<Image<uint8_t>, 3>& image);
 
 }  // namespace sateen

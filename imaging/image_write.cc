@@ -31,6 +31,7 @@ Result<std::vector<unsigned char>> Encode(const std::filesystem::path& path, con
   }
   OIIO::ImageSpec spec(size.width, size.height, static_cast<int>(channels),
                        OIIO::BaseTypeFromC<T>::value);
+  spec.attribute("Compression", "jpeg:90");  // of the formats that know it
   spec.attribute("DateTime", "");  // otherwise EXR gets the time of day, and no two files agree
 
   std::vector<unsigned char> bytes;
@@ -93,6 +94,17 @@ Status WritePng8(const std::filesystem::path& path, const std::array<Image<uint8
 
 Status WritePng16(const std::filesystem::path& path, const std::array<Image<uint16_t>, 3>& image) {
   return Write<uint16_t>(path, "png", image);
+}
+
+Result<std::string> EncodeJpeg(const std::array<Image<uint8_t>, 3>& image) {
+  try {
+    return Encode<uint8_t>("preview.jpg", "jpeg", image)
+        .map([](const std::vector<unsigned char>& bytes) {
+          return std::string(bytes.begin(), bytes.end());
+        });
+  } catch (const std::exception& error) {
+    return Fail(ErrorCode::kIo, "preview.jpg: cannot be encoded: {}", error.what());
+  }
 }
 
 }  // namespace sateen

@@ -10,13 +10,16 @@ Status CaptureOptions::Validate() const {
   if (!(level > 0.0 && level <= 1.0)) {
     return Fail(ErrorCode::kInvalidArgument, "level is {}; need more than 0 and at most 1", level);
   }
-  if (!(settings.exposure_s > 0.0 && settings.exposure_s <= 60.0)) {
+  if (exposure_s && !(*exposure_s > 0.0 && *exposure_s <= 60.0)) {
     return Fail(ErrorCode::kInvalidArgument, "exposure_s is {}; need more than 0 and at most 60",
-                settings.exposure_s);
+                *exposure_s);
   }
-  if (!(settings.f_number > 0.0 && settings.iso > 0.0)) {
+  if (!(f_number > 0.0 && iso > 0.0)) {
     return Fail(ErrorCode::kInvalidArgument, "f_number is {} and iso {}; need more than 0",
-                settings.f_number, settings.iso);
+                f_number, iso);
+  }
+  if (brackets < 1 || brackets > 3) {
+    return Fail(ErrorCode::kInvalidArgument, "brackets is {}; need 1 to 3", brackets);
   }
   if (!in(settle, milliseconds(0), milliseconds(10'000))) {
     return Fail(ErrorCode::kInvalidArgument, "settle is {} ms; need 0 to 10000", settle.count());

@@ -1,9 +1,7 @@
 #pragma once
 
 #include <chrono>
-#include <filesystem>
-#include <functional>
-#include <string>
+#include <optional>
 
 #include "core/error.h"
 #include "scanner/frame_check.h"
@@ -15,7 +13,12 @@ namespace sateen {
 // How a session is captured. What decides about its frames is in the journal, and kept on resuming.
 struct CaptureOptions {
   SessionKind kind = SessionKind::kFabric;
-  ExposureSettings settings;
+  // Of every frame, (0, 60] s. Absent: found by test frames (scanner/exposure_search.h).
+  std::optional<double> exposure_s;
+  double f_number = 8.0;
+  double iso = 100.0;
+  // Exposures a light, at most, where they are found: 1 to 3. A sheet always has one.
+  int brackets = 3;
   // Of each light, (0, 1].
   double level = 1.0;
   // From a light's going on to the exposure; 0 ms to 10 s.

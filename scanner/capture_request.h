@@ -1,8 +1,7 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
-#include <functional>
-#include <optional>
 #include <string>
 
 #include "core/error.h"
@@ -21,25 +20,32 @@ struct CaptureRequest {
   CaptureOptions options;
 };
 
-// Where a capture is, after every frame and every change of stage.
-struct CaptureEvent {
-  std::string stage;  // "metering", "capturing", "checking"
-  int frame = 0;      // frames that are done
-  int frames = 0;     // of the plan
-  std::string light;  // of the frame that is being taken; "dark" for none
-  double exposure_s = 0.0;
-  double peak = 0.0;  // of the latest frame: its 99.9th percentile, of what saturates
-  std::optional<double> seconds_left;
-};
-
-using CaptureObserver = std::function<void(const CaptureEvent&)>;
-
-/// Begins or resumes a session and takes it to its end with the devices, which it opens where they
-/// are not. `observer` is called from the thread of the capture. However it ends, all lights are off.
+/// Begins or resumes a session and takes it to its end with the devices, which it opens first where
+/// they are not. However it ends, all lights are off.
 ///
 /// Errors   as CaptureSession; kDevice where no board or no camera is found
 [[nodiscard]] Result<CaptureSummary> RunCapture(const CaptureRequest& request, RigDevices& devices,
                                                 const Task& task,
                                                 const CaptureObserver& observer = {});
+
+// What a capture would do, without taking a frame or writing a file: --dry-run.
+struct CaptureForecast {
+  CaptureRequest request;
+  FramePlan plan;               // at one exposure where it is still to be found
+  bool exposure_known = false;  // asked for
+  std::string port;             // of the board
+  std::string firmware;
+  CameraInfo camera;
+  ExposureSettings settings;  // as the camera has them now
+  std::uintmax_t bytes = 0;   // about, that the session takes
+  std::uintmax_t free_bytes = 0;
+};
+
+/// Looks whether the capture could begin: rig, devices, settings, channels of the board, room on the
+/// disk. Sets the camera; the lights stay off.
+///
+/// Errors   those that the capture would begin with
+[[nodiscard]] Result<CaptureForecast> ForecastCapture(const CaptureRequest& request,
+                                                      RigDevices& devices);
 
 }  // namespace sateen

@@ -2,9 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <condition_variable>
-#include <mutex>
-#include <thread>
 #include <utility>
 
 #include "core/check.h"
@@ -18,107 +15,11 @@ namespace sateen {
 namespace {
 
 namespace fs = std::filesystem;
-using std::chrono::milliseconds;
 
 constexpr const char* kRigFile = "rig.json";
 constexpr const char* kRecordFile = "session.json";
-constexpr const char* kFrames = "frames";
-constexpr const char* kIncoming = "incoming";
-constexpr int kRounds = 2;  // of taking again what the checks reject
-
-// Turns everything off when it goes out of scope.
-class LightsOff {
- public:
-  explicit LightsOff(LightBoard& board) : board_(board) {}
-  LightsOff(const LightsOff&) = delete;
-  LightsOff& operator=(const LightsOff&) = delete;
-  ~LightsOff() {
-    if (board_.state() == LightBoard::State::kReady) {
-      [[maybe_unused]] const Result<BoardState> ignored = board_.AllOff();
-    }
-  }
-
- private:
-  LightBoard& board_;
-};
-
-// Speaks to the board while the camera exposes, so that it keeps the light on; turns the light off
-// at once where the capture is cancelled. The board is its alone until Stop().
-class KeepAlive {
- public:
-  KeepAlive(LightBoard& board, milliseconds interval, const Task& task)
-      : board_(board), interval_(interval), task_(task) {
-    if (interval_ > milliseconds(0)) {
-      thread_ = std::thread([this] { Run(); });
-    }
-  }
-  KeepAlive(const KeepAlive&) = delete;
-  KeepAlive& operator=(const KeepAlive&) = delete;
-  ~KeepAlive() { Join(); }
-
-  Status Stop() {
-    Join();
-    return status_;
-  }
-
- private:
-  static constexpr milliseconds kStep{50};  // how soon a cancellation is heard
-
-  void Join() {
-    {
-      const std::lock_guard lock(mutex_);
-      stopped_ = true;
-    }
-    stop_.notify_all();
-    if (thread_.joinable()) {
-      thread_.join();
-    }
-  }
-
-  void Run() {
-    milliseconds silent{0};
-    std::unique_lock lock(mutex_);
-    while (!stop_.wait_for(lock, kStep, [&] { return stopped_; })) {
-      silent += kStep;
-      if (task_.Cancelled()) {
-        [[maybe_unused]] const Result<BoardState> ignored = board_.AllOff();
-        return;
-      }
-      if (silent >= interval_) {
-        silent = milliseconds(0);
-        if (const Result<BoardReport> report = board_.Report(); !report) {
-          status_ = tl::unexpected(report.error());
-          return;
-        }
-      }
-    }
-  }
-
-  LightBoard& board_;
-  milliseconds interval_;
-  const Task& task_;
-  std::mutex mutex_;  // for stopped_
-  std::condition_variable stop_;
-  bool stopped_ = false;
-  Status status_;
-  std::thread thread_;
-};
-
-std::string SafeName(std::string name) {
-  for (char& c : name) {
-    const bool is_safe = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') ||
-                         (c >= '0' && c <= '9') || c == '-' || c == '_' || c == '.';
-    c = is_safe ? c : '_';
-  }
-  return name;
-}
-
-std::string FileNameOf(std::size_t frame, const SessionFrame& planned, const fs::path& delivered) {
-  const std::string name = planned.role == FrameRole::kDark ? "dark" : SafeName(planned.light);
-  return fmt::format("{}/{:02}-{}{}{}", kFrames, frame, name,
-                     planned.role == FrameRole::kRepeat ? "-again" : "",
-                     LowerCase(delivered.extension().string()));
-}
+constexpr int kRounds = 2;     // of taking again what the checks reject
+constexpr int kMostPlans = 3;  // because a light was brighter than the exposures found
 
 Status MakeFolder(const fs::path& path) {
   std::error_code error;
@@ -149,40 +50,44 @@ Status CheckLights(const Rig& rig, const fs::path& file) {
   return {};
 }
 
-bool MayBeTriedAgain(ErrorCode code) {
-  return code == ErrorCode::kBadData || code == ErrorCode::kDevice || code == ErrorCode::kTimeout;
-}
-
-tl::unexpected<Error> Cancelled() {
-  return Fail(ErrorCode::kCancelled,
-              "cancelled; the lights are off, and what was captured is kept: go on with --resume");
-}
-
-// The board's word that this light alone is on, or none.
-Status ConfirmLit(const Light* light, const BoardState& state, const char* when) {
-  const unsigned wanted = light == nullptr ? 0U : 1U << static_cast<unsigned>(light->channel);
-  if (state.lit == wanted) {
-    return {};
+// A journal without a frame that is done has nothing to lose: killed before, or without a camera.
+bool HasFrames(const fs::path& dir) {
+  if (!Exists(dir / kJournalFile)) {
+    return false;
   }
-  const std::string what =
-      light == nullptr ? "no light" : fmt::format("light '{}' alone", light->name);
-  return Fail(
-      ErrorCode::kDevice, "{} should be on {}, but the board says that channels {:#06x} are{}",
-      what, when, state.lit,
-      state.fault != 0 ? fmt::format(" (fault {}: {})", state.fault, FaultText(state.fault))
-      : light != nullptr && state.lit == 0 ? "; did the camera take longer than --margin allows?"
-                                           : "");
+  const Result<std::optional<Journal>> journal = ReadJournal(dir);
+  return !journal || (*journal && std::ranges::any_of((*journal)->done, [](const auto& frame) {
+    return frame.has_value();
+  }));
+}
+
+bool IsPlanOf(const Rig& rig, const FramePlan& plan) {
+  std::vector<double> exposures_s;
+  for (const SessionFrame& frame : plan) {
+    if (frame.role == FrameRole::kLit && frame.light == rig.lights.front().name) {
+      exposures_s.push_back(*frame.exposure_s);
+    }
+  }
+  return !exposures_s.empty() &&
+         std::ranges::equal(plan, PlanOf(rig, exposures_s), [](const auto& a, const auto& b) {
+           return a.role == b.role && a.light == b.light && a.exposure_s == b.exposure_s;
+         });
 }
 
 }  // namespace
 
-FramePlan PlanOf(const Rig& rig) {
-  FramePlan plan = {{.role = FrameRole::kDark}};
+FramePlan PlanOf(const Rig& rig, const std::vector<double>& exposures_s) {
+  const SessionFrame dark = {.role = FrameRole::kDark, .exposure_s = exposures_s.back()};
+  FramePlan plan = {dark};
   for (const Light& light : rig.lights) {
-    plan.push_back({.role = FrameRole::kLit, .light = light.name});
+    for (const double exposure_s : exposures_s) {
+      plan.push_back({.role = FrameRole::kLit, .light = light.name, .exposure_s = exposure_s});
+    }
   }
-  plan.push_back({.role = FrameRole::kRepeat, .light = rig.lights.front().name});
-  plan.push_back({.role = FrameRole::kDark});
+  plan.push_back({.role = FrameRole::kRepeat,
+                  .light = rig.lights.front().name,
+                  .exposure_s = exposures_s.front()});
+  plan.push_back(dark);
   return plan;
 }
 
@@ -203,7 +108,6 @@ CaptureSession::CaptureSession(fs::path dir, Rig rig, Journal journal, JournalWr
       journal_(std::move(journal)),
       writer_(std::move(writer)),
       options_(options),
-      settings_(journal_.begun.settings),
       looks_(journal_.done.size()) {}
 
 Result<CaptureSession> CaptureSession::Begin(const fs::path& dir, const fs::path& rig_file,
@@ -215,15 +119,13 @@ Result<CaptureSession> CaptureSession::Begin(const fs::path& dir, const fs::path
   }
   Result<Rig> rig = ReadRig(rig_file);
   Status status = rig ? CheckLights(*rig, rig_file) : tl::unexpected(rig.error());
-  // A journal without a whole record: killed before anything was captured.
-  const bool has_journal = Exists(dir / kJournalFile) && ReadJournal(dir).value_or(Journal());
-  if (status && (Exists(dir / kRecordFile) || has_journal)) {
+  if (status && (Exists(dir / kRecordFile) || HasFrames(dir))) {
     status =
         Fail(ErrorCode::kInvalidArgument,
              "{}: holds a session already; choose another folder, or go on with it: --resume {}",
              dir.string(), dir.string());
   }
-  status = status.and_then([&] { return MakeFolder(dir / kFrames); }).and_then([&] {
+  status = status.and_then([&] { return MakeFolder(dir / "frames"); }).and_then([&] {
     return WriteFileWhole(dir / kRigFile, *rig_text);
   });
   if (!status) {
@@ -233,17 +135,18 @@ Result<CaptureSession> CaptureSession::Begin(const fs::path& dir, const fs::path
   if (!writer) {
     return tl::unexpected(writer.error());
   }
-  Journal journal{.begun = {.kind = options.kind,
-                            .rig = kRigFile,
-                            .rig_sha256 = Sha256(*rig_text),
-                            .settings = options.settings,
-                            .level = options.level,
-                            .plan = PlanOf(*rig)}};
-  journal.done.resize(journal.begun.plan.size());
+  const Journal journal{.begun = {.kind = options.kind,
+                                  .rig = kRigFile,
+                                  .rig_sha256 = Sha256(*rig_text),
+                                  .exposure_s = options.exposure_s,
+                                  .f_number = options.f_number,
+                                  .iso = options.iso,
+                                  .level = options.level,
+                                  .brackets = options.brackets}};
   if (const Status begun = writer->Begin(journal.begun); !begun) {
     return tl::unexpected(begun.error());
   }
-  return CaptureSession(dir, *std::move(rig), std::move(journal), *std::move(writer), options);
+  return CaptureSession(dir, *std::move(rig), journal, *std::move(writer), options);
 }
 
 Result<CaptureSession> CaptureSession::Resume(const fs::path& dir, const CaptureOptions& options) {
@@ -270,11 +173,7 @@ Result<CaptureSession> CaptureSession::Resume(const fs::path& dir, const Capture
                 "{}: is not the rig that this capture began with; restore it, or capture anew",
                 rig_file.string());
   }
-  const FramePlan plan = PlanOf(*rig);
-  const bool same_plan = std::ranges::equal(
-      plan, journal.begun.plan,
-      [](const auto& a, const auto& b) { return a.role == b.role && a.light == b.light; });
-  if (!same_plan) {
+  if (!journal.plan.empty() && !IsPlanOf(*rig, journal.plan)) {
     return Fail(ErrorCode::kBadData, "{}: plans other frames than this program takes; capture anew",
                 (dir / kJournalFile).string());
   }
@@ -296,12 +195,18 @@ std::vector<std::size_t> CaptureSession::Open() const {
 }
 
 const Light* CaptureSession::LightOf(std::size_t frame) const {
-  const auto light = std::ranges::find(rig_.lights, journal_.begun.plan[frame].light, &Light::name);
+  const auto light = std::ranges::find(rig_.lights, journal_.plan[frame].light, &Light::name);
   return light == rig_.lights.end() ? nullptr : &*light;
 }
 
+// Of the light's first exposure, which holds its bright parts; or a dark frame.
+bool CaptureSession::IsBase(std::size_t frame) const {
+  return frame == 0 || journal_.plan[frame].role != FrameRole::kLit ||
+         journal_.plan[frame - 1].light != journal_.plan[frame].light;
+}
+
 std::string CaptureSession::NameOf(std::size_t frame) const {
-  const SessionFrame& planned = journal_.begun.plan[frame];
+  const SessionFrame& planned = journal_.plan[frame];
   return planned.role == FrameRole::kDark  ? "dark"
          : planned.role == FrameRole::kLit ? planned.light
                                            : planned.light + " again";
@@ -336,152 +241,31 @@ Status CaptureSession::VerifyDone() {
   return {};
 }
 
-Result<SessionFrame> CaptureSession::Accept(std::size_t frame, const CapturedFile& file) {
-  SessionFrame done = journal_.begun.plan[frame];
-  done.exposure_s = settings_.exposure_s;
-  done.f_number = settings_.f_number;
-  done.iso = settings_.iso;
-  Result<FrameLook> look = CheckFrame({file.path, done.Exposure(), std::nullopt, rig_.response},
-                                      rig_, settings_, done.role, options_.checks);
-  if (!look) {
-    return tl::unexpected(look.error());
+void CaptureSession::Tell(const Tools& tools, const char* stage, const std::string& light,
+                          double exposure_s) const {
+  if (!tools.observer) {
+    return;
   }
-  done.sha256 = look->means.sha256;
-  done.file = FileNameOf(frame, done, file.path);
-  const fs::path place = dir_ / done.file;
-  Status placed = FlushToDisk(file.path, place).and_then([&]() -> Status {
-    std::error_code error;
-    fs::rename(file.path, place, error);
-    if (error) {
-      return Fail(ErrorCode::kIo, "{}: cannot put in place: {}", place.string(), error.message());
-    }
-    return FlushToDisk(place.parent_path(), place.parent_path());
-  });
-  if (!placed) {
-    return tl::unexpected(placed.error());
+  CaptureEvent event{.stage = stage,
+                     .done = journal_.done.size() - Open().size(),
+                     .frames = journal_.done.size(),
+                     .light = light,
+                     .exposure_s = exposure_s,
+                     .peak = peak_};
+  if (taken_ > 0) {
+    const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - started_;
+    event.left_s = spent.count() / taken_ * static_cast<double>(Open().size());
   }
-  looks_[frame] = *std::move(look);
-  return done;
+  tools.observer(event);
 }
 
-Result<SessionFrame> CaptureSession::TryFrame(std::size_t frame, LightBoard& board,
-                                              TetheredCamera& camera, const Task& task) {
-  std::error_code ignored;  // what is left there is only in the way
-  fs::remove_all(dir_ / kIncoming, ignored);
-  Status ready = MakeFolder(dir_ / kIncoming);
-  if (ready && board.state() != LightBoard::State::kReady) {
-    ready = board.Connect();
-  }
-  if (!ready) {
-    return tl::unexpected(ready.error());
-  }
-  const LightsOff off(board);
-  const Light* light = LightOf(frame);
-  const milliseconds exposure(static_cast<int>(std::ceil(1000.0 * settings_.exposure_s)));
-  Result<BoardState> state;
-  if (light == nullptr) {
-    state = board.AllOff();
-  } else {
-    const auto channel = static_cast<std::size_t>(light->channel);
-    milliseconds on_time = options_.settle + exposure + options_.margin;
-    if (channel < board.Info().lights.size()) {
-      on_time = std::min(on_time, board.Info().lights[channel].max_on);
-    }
-    state = board.SetLight(light->channel, journal_.begun.level, on_time);
-  }
-  Status lit =
-      state ? ConfirmLit(light, *state, "before the exposure") : tl::unexpected(state.error());
-  if (!lit) {
-    return tl::unexpected(lit.error());
-  }
-  board.Wait(options_.settle);
-  KeepAlive keep_alive(board, options_.keep_alive, task);
-  const Result<CapturedFile> file = camera.Capture(dir_ / kIncoming, exposure + options_.deadline);
-  const Status kept = keep_alive.Stop();
-  if (task.Cancelled()) {
-    return Cancelled();
-  }
-  if (!file) {
-    return tl::unexpected(file.error());
-  }
-  const Result<BoardReport> report = kept ? board.Report() : tl::unexpected(kept.error());
-  lit = report ? ConfirmLit(light, report->state, "until the camera had delivered")
-               : tl::unexpected(report.error());
-  if (!lit) {
-    return tl::unexpected(lit.error());
-  }
-  const Result<BoardState> dark = board.AllOff();
-  lit = dark ? ConfirmLit(nullptr, *dark, "after the exposure") : tl::unexpected(dark.error());
-  if (!lit) {
-    return tl::unexpected(lit.error());
-  }
-  return Accept(frame, *file);
-}
-
-Status CaptureSession::TakeFrame(std::size_t frame, LightBoard& board, TetheredCamera& camera,
-                                 const Task& task) {
-  for (int attempt = 1;; ++attempt) {
-    if (task.Cancelled()) {
-      return Cancelled();
-    }
-    if (Status begun = writer_.FrameBegun(frame); !begun) {
-      return begun;
-    }
-    const Result<SessionFrame> taken = TryFrame(frame, board, camera, task);
-    if (taken) {
-      ++taken_;
-      return writer_.FrameDone(frame, *taken).map([&] { journal_.done[frame] = *taken; });
-    }
-    Error error = taken.error();
-    if (!MayBeTriedAgain(error.code)) {
-      return tl::unexpected(error);
-    }
-    if (Status rejected = Reject(frame, error.message); !rejected) {
-      return rejected;
-    }
-    error.message =
-        fmt::format("frame {} of {} ({}): {}{}", frame + 1, journal_.done.size(), NameOf(frame),
-                    error.message, attempt > 1 ? fmt::format("; tried {} times", attempt) : "");
-    if (attempt == options_.tries) {
-      return tl::unexpected(error);
-    }
-    if (error.code == ErrorCode::kDevice || error.code == ErrorCode::kTimeout) {
-      const Status again = camera.Open()
-                               .and_then([&](const CameraInfo&) {
-                                 return camera.Configure(journal_.begun.settings);
-                               })
-                               .map([&](const ExposureSettings& set) { settings_ = set; });
-      if (!again) {
-        return Fail(again.error().code, "{}; and then: {}", error.message, again.error().message);
-      }
-    }
-  }
-}
-
-Status CaptureSession::TakeOpenFrames(LightBoard& board, TetheredCamera& camera, const Task& task) {
-  const std::vector<std::size_t> open = Open();
-  const auto begin = std::chrono::steady_clock::now();
-  for (std::size_t i = 0; i < open.size(); ++i) {
-    std::string left;
-    if (i > 0) {
-      const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - begin;
-      left = fmt::format(", {:.0f} s left", std::ceil(spent.count() / static_cast<double>(i) *
-                                                      static_cast<double>(open.size() - i)));
-    }
-    task.BeginStage(NameOf(open[i]) + left, static_cast<int>(journal_.done.size()));
-    task.Advance(static_cast<int>(journal_.done.size() - open.size() + i));
-    if (Status taken = TakeFrame(open[i], board, camera, task); !taken) {
-      return taken;
-    }
-  }
-  return {};
-}
-
-Result<CaptureCheck> CaptureSession::CheckAll(const Task& task) {
+Result<CaptureCheck> CaptureSession::CheckAll() {
   CaptureLooks looks;
-  task.BeginStage("checking", static_cast<int>(looks_.size()));
   for (std::size_t frame = 0; frame < looks_.size(); ++frame) {
     const SessionFrame& done = *journal_.done[frame];
+    if (!IsBase(frame)) {
+      continue;  // the same light as the frame before
+    }
     if (!looks_[frame]) {  // of an earlier run
       Result<FrameLook> look = CheckFrame(FileOf(done), rig_, {.exposure_s = *done.exposure_s},
                                           done.role, options_.checks);
@@ -498,7 +282,6 @@ Result<CaptureCheck> CaptureSession::CheckAll(const Task& task) {
     } else {
       (looks.dark_first == nullptr ? looks.dark_first : looks.dark_last) = look;
     }
-    task.Advance();
   }
   return CheckCapture(rig_, looks, options_.checks);
 }
@@ -506,7 +289,7 @@ Result<CaptureCheck> CaptureSession::CheckAll(const Task& task) {
 Status CaptureSession::RejectFaults(const CaptureCheck& check) {
   for (const CaptureFault& fault : check.faults) {
     for (std::size_t frame = 0; frame < journal_.done.size(); ++frame) {
-      const bool is_lit = journal_.begun.plan[frame].role == FrameRole::kLit;
+      const bool is_lit = journal_.plan[frame].role == FrameRole::kLit;
       const bool concerned =
           fault.lights.empty() || (is_lit && std::ranges::any_of(fault.lights, [&](std::size_t k) {
                                      return &rig_.lights[k] == LightOf(frame);
@@ -537,31 +320,59 @@ Result<CaptureSummary> CaptureSession::Complete(CaptureCheck check) {
     return tl::unexpected(status.error());
   }
   std::error_code ignored;
-  fs::remove_all(dir_ / kIncoming, ignored);
+  fs::remove_all(dir_ / "incoming", ignored);
   return summary;
 }
 
+Result<CaptureSummary> CaptureSession::Finish() {
+  return VerifyDone().and_then([&] { return CheckAll(); }).and_then([&](CaptureCheck check) {
+    return Complete(std::move(check));
+  });
+}
+
+Status CaptureSession::TakeAll(Tools& tools) {
+  for (int plans = 0; journal_.plan.empty() || !Open().empty();) {
+    Status done;
+    if (journal_.plan.empty() || brighter_) {
+      if (plans++ == kMostPlans) {
+        return Fail(ErrorCode::kBadData,
+                    "light '{}' is too bright for every exposure that was found; do the lights "
+                    "flicker? Or give --exposure",
+                    rig_.lights[brighter_.value_or(0)].name);
+      }
+      done = MakePlan(tools);
+    }
+    done = done.and_then([&] { return TakeOpenFrames(tools); });
+    if (!done) {
+      return done;
+    }
+  }
+  return {};
+}
+
 Result<CaptureSummary> CaptureSession::Run(LightBoard& board, TetheredCamera& camera,
-                                           const Task& task) {
+                                           const Task& task, const CaptureObserver& observer) {
+  Tools tools{board, camera, task, observer};
+  started_ = std::chrono::steady_clock::now();
   if (const Status verified = VerifyDone(); !verified) {
     return tl::unexpected(verified.error());
   }
   for (int round = 1;; ++round) {
-    if (!Open().empty()) {
-      const Result<ExposureSettings> set = camera.Configure(journal_.begun.settings);
-      if (!set) {
-        return tl::unexpected(set.error());
-      }
-      settings_ = *set;
-      if (const Status taken = TakeOpenFrames(board, camera, task); !taken) {
-        return tl::unexpected(taken.error());
-      }
+    if (const Status taken = TakeAll(tools); !taken) {
+      return tl::unexpected(
+          taken.error().code == ErrorCode::kCancelled
+              ? Error{ErrorCode::kCancelled,
+                      fmt::format("cancelled; the lights are off, and what was captured is kept: "
+                                  "go on with sateen capture --resume {}",
+                                  dir_.string())}
+              : taken.error());
     }
-    Result<CaptureCheck> check = CheckAll(task);
+    Tell(tools, "checking", "", 0.0);
+    Result<CaptureCheck> check = CheckAll();
     if (!check) {
       return tl::unexpected(check.error());
     }
-    if (check->faults.empty() || journal_.complete) {
+    if (check->faults.empty()) {
       return Complete(*std::move(check));
     }
     if (const Status rejected = RejectFaults(*check); !rejected) {

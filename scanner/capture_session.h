@@ -1,7 +1,10 @@
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <filesystem>
+#include <functional>
+#include <future>
 #include <optional>
 #include <string>
 #include <vector>
@@ -13,9 +16,24 @@
 #include "scanner/frame_check.h"
 #include "scanner/journal.h"
 #include "scanner/light_board.h"
+#include "scanner/signal_levels.h"
 #include "scanner/tethered_camera.h"
 
 namespace sateen {
+
+// Where a capture is.
+struct CaptureEvent {
+  std::string stage;             // "metering", "capturing", "checking"
+  std::size_t done = 0;          // frames that count
+  std::size_t frames = 0;        // of the plan; 0 while it is not made
+  std::string light;             // of the frame that is being taken; "dark" for none
+  double exposure_s = 0.0;       // of that frame
+  double peak = 0.0;             // of the latest frame that was looked at (scanner/signal_levels.h)
+  std::optional<double> left_s;  // time left
+};
+
+// Told of every change, from the thread of the capture.
+using CaptureObserver = std::function<void(const CaptureEvent&)>;
 
 // What a capture tells of itself when it is complete.
 struct CaptureSummary {
@@ -26,8 +44,9 @@ struct CaptureSummary {
   int rejected = 0;  // frames of this run that did not count
 };
 
-// The dark, every light of the rig in its order, the first light again, the dark again.
-[[nodiscard]] FramePlan PlanOf(const Rig& rig);
+// The dark, every light of the rig in its order at each exposure, the first light again at the first
+// exposure, the dark again; the dark at the last, the longest.
+[[nodiscard]] FramePlan PlanOf(const Rig& rig, const std::vector<double>& exposures_s);
 
 /// One session on its way to the disk.
 ///
@@ -38,10 +57,12 @@ struct CaptureSummary {
 ///     frames/           00-dark.dng, 01-led-0.dng ...: renamed from incoming/ when on the disk
 ///     session.json      last, when every frame is there and checked
 ///
-/// A frame: its light on, and the board's word that it alone is; the camera's exposure; the board's
-/// word that the light was on all the while; off. Then the file must hold together by itself
-/// (CheckFrame), is flushed, renamed and recorded. When all are there they are checked against each
-/// other (CheckCapture): what cannot be right is rejected, and taken again where that may help.
+/// Exposures that are not given are found by test frames of the brightest light
+/// (scanner/exposure_search.h), and found again where a light turns out to be brighter. A frame is
+/// taken under its light alone (scanner/lit_exposure.h). Then the file must hold together by itself
+/// (CheckFrame), is flushed, renamed and recorded, while the next one is being taken. When all are
+/// there they are checked against each other (CheckCapture): what cannot be right is rejected, and
+/// taken again where that may help.
 ///
 /// Killed at any moment, with any file half written, it goes on with Resume(): frames that the journal
 /// says are done and whose hashes still hold are not taken again.
@@ -52,40 +73,67 @@ struct CaptureSummary {
 /// After any error, and when this goes out of scope, all lights have been told to go off.
 class CaptureSession {
  public:
-  // Makes the folder and begins its journal.
+  // Makes the folder and begins its journal. A journal of a capture that has no frame yet is begun anew.
   [[nodiscard]] static Result<CaptureSession> Begin(const std::filesystem::path& dir,
                                                     const std::filesystem::path& rig_file,
                                                     const CaptureOptions& options);
-  // Of `options` what the journal says is not used: kind, settings, level.
+  // Of `options` what the journal says is not used: kind, exposure, level.
   [[nodiscard]] static Result<CaptureSession> Resume(const std::filesystem::path& dir,
                                                      const CaptureOptions& options);
 
-  [[nodiscard]] const JournalBegun& Plan() const { return journal_.begun; }
+  [[nodiscard]] const Journal& Record() const { return journal_; }
   [[nodiscard]] const Rig& GetRig() const { return rig_; }
   // Frames of the plan that are still to be taken.
   [[nodiscard]] std::vector<std::size_t> Open() const;
 
   // `camera` is open. Connects the board where it is not.
   [[nodiscard]] Result<CaptureSummary> Run(LightBoard& board, TetheredCamera& camera,
-                                           const Task& task);
+                                           const Task& task, const CaptureObserver& observer = {});
+  // Of a journal that is complete: needs no device. Writes session.json where it is missing.
+  [[nodiscard]] Result<CaptureSummary> Finish();
 
  private:
+  // What a capture is run with.
+  struct Tools {
+    LightBoard& board;
+    TetheredCamera& camera;
+    const Task& task;
+    const CaptureObserver& observer;
+  };
+  struct Looked {
+    FrameLook look;
+    SignalLevels levels;
+  };
+  // A frame that has arrived, while it is being looked at and flushed by another thread.
+  struct Arrived {
+    std::size_t frame = 0;
+    SessionFrame record;
+    std::filesystem::path path;
+    std::future<Result<Looked>> looked;
+  };
+
   CaptureSession(std::filesystem::path dir, Rig rig, Journal journal, JournalWriter writer,
                  const CaptureOptions& options);
 
   [[nodiscard]] Status VerifyDone();
-  [[nodiscard]] Status TakeOpenFrames(LightBoard& board, TetheredCamera& camera, const Task& task);
-  [[nodiscard]] Status TakeFrame(std::size_t frame, LightBoard& board, TetheredCamera& camera,
-                                 const Task& task);
-  [[nodiscard]] Result<SessionFrame> TryFrame(std::size_t frame, LightBoard& board,
-                                              TetheredCamera& camera, const Task& task);
-  [[nodiscard]] Result<SessionFrame> Accept(std::size_t frame, const CapturedFile& file);
+  [[nodiscard]] Status MakePlan(Tools& tools);
+  [[nodiscard]] Result<std::vector<double>> Meter(std::size_t light, Tools& tools);
+  [[nodiscard]] Status TakeAll(Tools& tools);
+  [[nodiscard]] Status TakeOpenFrames(Tools& tools);
+  [[nodiscard]] Result<Arrived> Shoot(std::size_t frame, int attempt, Tools& tools);
+  [[nodiscard]] Status Settle(Arrived arrived, Tools& tools);
+  [[nodiscard]] Status Place(const Arrived& arrived, SessionFrame& record);
+  [[nodiscard]] Status TakeAgain(Error error, std::size_t frame, int attempt, Tools& tools);
+  [[nodiscard]] Result<ExposureSettings> Configure(double exposure_s, TetheredCamera& camera);
   [[nodiscard]] Status Reject(std::size_t frame, const std::string& reason);
-  [[nodiscard]] Result<CaptureCheck> CheckAll(const Task& task);
+  [[nodiscard]] Result<CaptureCheck> CheckAll();
   [[nodiscard]] Status RejectFaults(const CaptureCheck& check);
   [[nodiscard]] Result<CaptureSummary> Complete(CaptureCheck check);
+  void Tell(const Tools& tools, const char* stage, const std::string& light,
+            double exposure_s) const;
 
   [[nodiscard]] const Light* LightOf(std::size_t frame) const;
+  [[nodiscard]] bool IsBase(std::size_t frame) const;
   [[nodiscard]] std::string NameOf(std::size_t frame) const;
   [[nodiscard]] FrameFile FileOf(const SessionFrame& frame) const;
 
@@ -94,8 +142,15 @@ class CaptureSession {
   Journal journal_;
   JournalWriter writer_;
   CaptureOptions options_;
-  ExposureSettings settings_;                    // as the camera has them
+  struct Configured {
+    double asked_s = 0.0;
+    ExposureSettings settings;  // as the camera has them
+  };
+  std::optional<Configured> configured_;
   std::vector<std::optional<FrameLook>> looks_;  // of done frames
+  std::optional<std::size_t> brighter_;          // light that the exposures found are too long for
+  double peak_ = 0.0;
+  std::chrono::steady_clock::time_point started_;
   int taken_ = 0;
   int rejected_ = 0;
 };

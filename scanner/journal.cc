@@ -31,25 +31,39 @@ Result<JournalBegun> ReadBegun(JsonReader& json) {
   begun.rig = ReadFileName(json, "rig");
   begun.rig_sha256 = ReadHash(json, "rig_sha256").value_or("");
   json.Require(!begun.rig_sha256.empty(), "rig_sha256", "is missing; need the rig's hash");
-  begun.settings = {.exposure_s = ReadSetting(json, "exposure_s"),
-                    .f_number = ReadSetting(json, "f_number"),
-                    .iso = ReadSetting(json, "iso")};
+  begun.exposure_s = json.OptionalNumber("exposure_s");
+  json.Require(begun.exposure_s.value_or(1.0) > 0.0, "exposure_s", "is not above 0");
+  begun.f_number = ReadSetting(json, "f_number");
+  begun.iso = ReadSetting(json, "iso");
   begun.level = ReadSetting(json, "level");
   json.Require(begun.level <= 1.0, "level", fmt::format("is {}; need at most 1", begun.level));
-  std::vector<JsonReader> plan = json.Objects("plan");
-  json.Require(!plan.empty(), "plan", "is empty; need at least one frame");
+  begun.brackets = json.Integer("brackets");
+  json.Require(begun.brackets >= 1, "brackets",
+               fmt::format("is {}; need at least 1", begun.brackets));
   if (const Status status = json.Finish(); !status) {
     return tl::unexpected(status.error());
   }
-  for (JsonReader& planned : plan) {
+  return begun;
+}
+
+Result<FramePlan> ReadPlan(JsonReader& json) {
+  json.Require(!json.String("reason").empty(), "reason", "is empty; need the reason");
+  std::vector<JsonReader> frames = json.Objects("plan");
+  json.Require(!frames.empty(), "plan", "is empty; need at least one frame");
+  if (const Status status = json.Finish(); !status) {
+    return tl::unexpected(status.error());
+  }
+  FramePlan plan;
+  for (JsonReader& planned : frames) {
     SessionFrame frame;
     ReadRoleAndLight(planned, frame);
+    frame.exposure_s = ReadSetting(planned, "exposure_s");
     if (const Status status = planned.Finish(); !status) {
       return tl::unexpected(status.error());
     }
-    begun.plan.push_back(std::move(frame));
+    plan.push_back(std::move(frame));
   }
-  return begun;
+  return plan;
 }
 
 Result<SessionFrame> ReadDone(JsonReader& json, const SessionFrame& planned) {
@@ -76,8 +90,12 @@ class JournalReader {
     JsonReader json(record, where);
     const std::string name = json.String("record");
     json.Require(!journal_->complete, "record", "follows the complete one; need nothing after it");
+    if (name == "planned") {
+      return TakePlanned(json);
+    }
     if (name == "complete") {
       const bool all_done =
+          !journal_->plan.empty() &&
           std::ranges::all_of(journal_->done, [](const auto& frame) { return frame.has_value(); });
       json.Require(all_done, "record", "is complete, but not every frame is done");
       journal_->complete = true;
@@ -102,8 +120,17 @@ class JournalReader {
     }
     journal_.emplace();
     journal_->begun = *std::move(begun);
-    journal_->done.resize(journal_->begun.plan.size());
-    is_begun_.resize(journal_->begun.plan.size());
+    return {};
+  }
+
+  Status TakePlanned(JsonReader& json) {
+    Result<FramePlan> plan = ReadPlan(json);
+    if (!plan) {
+      return tl::unexpected(plan.error());
+    }
+    journal_->plan = *std::move(plan);
+    journal_->done.assign(journal_->plan.size(), std::nullopt);
+    is_begun_.assign(journal_->plan.size(), false);
     return {};
   }
 
@@ -111,7 +138,7 @@ class JournalReader {
     const int place = json.Integer("frame");
     const size_t count = journal_->done.size();
     json.Require(place >= 0 && static_cast<size_t>(place) < count, "frame",
-                 fmt::format("is {}; the plan has frames 0 to {}", place, count - 1));
+                 fmt::format("is {}; the plan has {} frames, from 0", place, count));
     if (place < 0 || static_cast<size_t>(place) >= count) {
       return Finished(json);
     }
@@ -122,7 +149,7 @@ class JournalReader {
       is_begun_[frame] = true;
     } else if (name == "frame done") {
       json.Require(is_begun_[frame] && !done, "frame", "is done, but was not begun");
-      Result<SessionFrame> is = ReadDone(json, journal_->begun.plan[frame]);
+      Result<SessionFrame> is = ReadDone(json, journal_->plan[frame]);
       if (!is) {
         return tl::unexpected(is.error());
       }
@@ -137,7 +164,9 @@ class JournalReader {
     } else {
       json.Require(
           false, "record",
-          fmt::format("is \"{}\"; need frame begun, frame done, frame rejected or complete", name));
+          fmt::format(
+              "is \"{}\"; need planned, frame begun, frame done, frame rejected or complete",
+              name));
     }
     return json.Finish();
   }
@@ -254,14 +283,21 @@ Status JournalWriter::Begin(const JournalBegun& begun) {
                                    {"record", "begun"},
                                    {"kind", Name(begun.kind)},
                                    {"rig", begun.rig},
-                                   {"rig_sha256", begun.rig_sha256},
-                                   {"exposure_s", begun.settings.exposure_s},
-                                   {"f_number", begun.settings.f_number},
-                                   {"iso", begun.settings.iso},
-                                   {"level", begun.level},
-                                   {"plan", nlohmann::ordered_json::array()}};
-  for (const SessionFrame& frame : begun.plan) {
+                                   {"rig_sha256", begun.rig_sha256}};
+  PutIfKnown(record, "exposure_s", begun.exposure_s);
+  record["f_number"] = begun.f_number;
+  record["iso"] = begun.iso;
+  record["level"] = begun.level;
+  record["brackets"] = begun.brackets;
+  return Append(LineOf(record));
+}
+
+Status JournalWriter::Planned(const FramePlan& plan, const std::string& reason) {
+  nlohmann::ordered_json record = {
+      {"record", "planned"}, {"reason", reason}, {"plan", nlohmann::ordered_json::array()}};
+  for (const SessionFrame& frame : plan) {
     record["plan"].push_back(RoleAndLightToJson(frame));
+    PutIfKnown(record["plan"].back(), "exposure_s", frame.exposure_s);
   }
   return Append(LineOf(record));
 }

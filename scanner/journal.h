@@ -12,7 +12,7 @@
 
 namespace sateen {
 
-// The frames that a capture takes, in this order: role and light, the rest is not known yet.
+// The frames that a capture takes, in this order: role, light and exposure_s, the rest is not known yet.
 using FramePlan = std::vector<SessionFrame>;
 
 // What a capture set out to do: the first record of its journal.
@@ -20,16 +20,20 @@ struct JournalBegun {
   SessionKind kind = SessionKind::kFabric;
   std::string rig;  // relative to the session's folder
   std::string rig_sha256;
-  ExposureSettings settings;  // as asked of the camera
-  double level = 1.0;         // of the lights
-  FramePlan plan;
+  std::optional<double> exposure_s;  // as asked of the camera; nothing: to be found
+  double f_number = 8.0;
+  double iso = 100.0;
+  double level = 1.0;  // of the lights
+  int brackets = 3;    // exposures a light, at most, where they are to be found
 };
 
 /// journal.jsonl of a session that is being captured, one JSON object a line, each on the disk before
 /// the capture goes on:
 ///
 ///     {"schema": "sateen.journal/1", "record": "begun", "kind", "rig", "rig_sha256", "exposure_s",
-///      "f_number", "iso", "level", "plan": [{"role", "light"}, ...]}
+///      "f_number", "iso", "level", "brackets"}           exposure_s: absent where it is to be found
+///     {"record": "planned", "reason": "...", "plan": [{"role", "light", "exposure_s"}, ...]}
+///                                                       all frames of an earlier plan are open again
 ///     {"record": "frame begun", "frame": 3}             3: its place in the plan, from 0
 ///     {"record": "frame done", "frame": 3, "is": {...}}           as in session.json, all keys
 ///     {"record": "frame rejected", "frame": 3, "reason": "..."}   begun or done before
@@ -41,6 +45,7 @@ struct JournalBegun {
 ///     done               error      error      -> open
 struct Journal {
   JournalBegun begun;
+  FramePlan plan;                                 // empty until it is made
   std::vector<std::optional<SessionFrame>> done;  // one for each of the plan
   int rejected = 0;                               // records of it
   bool complete = false;
@@ -75,6 +80,7 @@ class JournalWriter {
   ~JournalWriter();
 
   [[nodiscard]] Status Begin(const JournalBegun& begun);
+  [[nodiscard]] Status Planned(const FramePlan& plan, const std::string& reason);
   [[nodiscard]] Status FrameBegun(std::size_t frame);
   [[nodiscard]] Status FrameDone(std::size_t frame, const SessionFrame& done);
   [[nodiscard]] Status FrameRejected(std::size_t frame, const std::string& reason);

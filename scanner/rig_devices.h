@@ -14,8 +14,9 @@ namespace sateen {
 
 // Which devices make up the rig.
 struct RigDeviceNames {
-  std::string port;    // serial port of the LED board; empty: the only one that may be it
-  std::string camera;  // "usb:001,004", "ptpip:192.168.1.1", "folder:DIR"; empty: the only one on USB
+  std::string port;  // serial port of the LED board; empty: the only one that may be it
+  std::string
+      camera;  // "usb:001,004", "ptpip:192.168.1.1", "folder:DIR"; empty: the only one on USB
 };
 
 // The LED board and the camera of the rig, opened when first asked for, and open until Release() or

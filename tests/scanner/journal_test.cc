@@ -21,11 +21,17 @@ JournalBegun Begun() {
   return {.kind = SessionKind::kSheet,
           .rig = "rig.json",
           .rig_sha256 = kHash,
-          .settings = {.exposure_s = 0.1, .f_number = 5.6, .iso = 200.0},
+          .exposure_s = 0.1,
+          .f_number = 5.6,
+          .iso = 200.0,
           .level = 0.5,
-          .plan = {{.role = FrameRole::kDark},
-                   {.role = FrameRole::kLit, .light = "east"},
-                   {.role = FrameRole::kRepeat, .light = "east"}}};
+          .brackets = 2};
+}
+
+FramePlan Planned() {
+  return {{.role = FrameRole::kDark, .exposure_s = 0.1},
+          {.role = FrameRole::kLit, .light = "east", .exposure_s = 0.1},
+          {.role = FrameRole::kRepeat, .light = "east", .exposure_s = 0.1}};
 }
 
 SessionFrame Done(const SessionFrame& planned) {
@@ -39,10 +45,11 @@ SessionFrame Done(const SessionFrame& planned) {
 }
 
 Status WriteAll(JournalWriter& writer) {
-  Status status = writer.Begin(Begun());
+  Status status =
+      writer.Begin(Begun()).and_then([&] { return writer.Planned(Planned(), "as asked"); });
   for (size_t frame = 0; frame < 3 && status; ++frame) {
     status = writer.FrameBegun(frame).and_then(
-        [&] { return writer.FrameDone(frame, Done(Begun().plan[frame])); });
+        [&] { return writer.FrameDone(frame, Done(Planned()[frame])); });
   }
   return status.and_then([&] { return writer.Complete(); });
 }
@@ -76,8 +83,9 @@ TEST(Journal, GivesBackWhatWasWritten) {
     Result<JournalWriter> writer = JournalWriter::Open(temp.Path(), 0);
     ASSERT_TRUE(writer) << writer.error().message;
     ASSERT_TRUE(writer->Begin(Begun()));
+    ASSERT_TRUE(writer->Planned(Planned(), "as asked"));
     ASSERT_TRUE(writer->FrameBegun(1));
-    ASSERT_TRUE(writer->FrameDone(1, Done(Begun().plan[1])));
+    ASSERT_TRUE(writer->FrameDone(1, Done(Planned()[1])));
     ASSERT_TRUE(writer->FrameBegun(0));
     ASSERT_TRUE(writer->FrameRejected(0, "is clipped"));
   }
@@ -86,13 +94,15 @@ TEST(Journal, GivesBackWhatWasWritten) {
   const Journal& journal = read->value();
   EXPECT_EQ(journal.begun.kind, SessionKind::kSheet);
   EXPECT_EQ(journal.begun.rig_sha256, kHash);
-  EXPECT_EQ(journal.begun.settings.exposure_s, 0.1);
-  EXPECT_EQ(journal.begun.settings.f_number, 5.6);
-  EXPECT_EQ(journal.begun.settings.iso, 200.0);
+  EXPECT_EQ(journal.begun.exposure_s, 0.1);
+  EXPECT_EQ(journal.begun.f_number, 5.6);
+  EXPECT_EQ(journal.begun.iso, 200.0);
   EXPECT_EQ(journal.begun.level, 0.5);
-  ASSERT_EQ(journal.begun.plan.size(), 3U);
-  EXPECT_EQ(journal.begun.plan[2].role, FrameRole::kRepeat);
-  EXPECT_EQ(journal.begun.plan[2].light, "east");
+  EXPECT_EQ(journal.begun.brackets, 2);
+  ASSERT_EQ(journal.plan.size(), 3U);
+  EXPECT_EQ(journal.plan[2].role, FrameRole::kRepeat);
+  EXPECT_EQ(journal.plan[2].light, "east");
+  EXPECT_EQ(journal.plan[2].exposure_s, 0.1);
   EXPECT_FALSE(journal.done[0]);
   ASSERT_TRUE(journal.done[1]);
   EXPECT_EQ(journal.done[1]->exposure_s, 1.0 / 3.0);  // to the last bit
@@ -121,16 +131,16 @@ TEST(Journal, IsReadWhereverItsLastLineWasTorn) {
 TEST(Journal, GoesOnBehindATornLine) {
   const TempFolder temp;
   const std::vector<std::string> lines = LinesOf(WholeText());
-  WriteText(temp.Path() / kJournalFile, lines[0] + "\n" + lines[1] + "\n{\"rec");
+  WriteText(temp.Path() / kJournalFile, testing::Lines({lines[0], lines[1], lines[2]}) + "{\"rec");
   const auto torn = ReadJournal(temp.Path());
   ASSERT_TRUE(torn && *torn);
   {
     Result<JournalWriter> writer = JournalWriter::Open(temp.Path(), (*torn)->whole_bytes);
     ASSERT_TRUE(writer);
-    ASSERT_TRUE(writer->FrameDone(0, Done(Begun().plan[0])));
+    ASSERT_TRUE(writer->FrameDone(0, Done(Planned()[0])));
   }
   EXPECT_EQ(LinesOf(*ReadFileBytes(temp.Path() / kJournalFile)),
-            (std::vector<std::string>{lines[0], lines[1], lines[2]}));
+            (std::vector<std::string>{lines[0], lines[1], lines[2], lines[3]}));
 }
 
 // Each damage is an error of the line where it is.
@@ -149,45 +159,61 @@ TEST(Journal, NamesTheLineOfWhatDoesNotParse) {
       changed[line].replace(at, from.size(), to);
     };
   };
-  expect([](auto& l) { l[2].pop_back(); }, "journal.jsonl: line 3: not valid JSON");
-  expect([](auto& l) { l[2] = ""; }, "line 3: not valid JSON");
+  expect([](auto& l) { l[3].pop_back(); }, "journal.jsonl: line 4: not valid JSON");
+  expect([](auto& l) { l[3] = ""; }, "line 4: not valid JSON");
   expect(replace(0, "journal/1", "journal/2"), "line 1: schema is \"sateen.journal/2\"");
   expect(replace(0, "begun", "complete"), "line 1: record is not begun");
   expect(replace(0, "\"level\":0.5", "\"level\":1.5"), "line 1: level is 1.5");
   expect(replace(0, "\"iso\":200.0", "\"iso\":0"), "line 1: iso is 0");
   expect(replace(0, "\"iso\"", "\"ISO\""), "line 1: iso is missing");
   expect(replace(0, "\"level\"", "\"gain\":1,\"level\""), "line 1: gain is not known");
-  expect(replace(0, "\"role\":\"dark\"", "\"role\":\"dark\",\"light\":\"x\""),
+  expect(replace(0, "\"brackets\":2", "\"brackets\":0"), "line 1: brackets is 0");
+  expect(replace(0, "\"exposure_s\":0.1", "\"exposure_s\":0.0"), "line 1: exposure_s is not");
+  expect(replace(1, "\"role\":\"dark\"", "\"role\":\"dark\",\"light\":\"x\""),
          "light is not known");
+  expect(replace(1, "as asked", ""), "line 2: reason is empty");
+  expect(replace(1, "0.1}]", "0}]"), "exposure_s is 0");
+  expect([](auto& l) { l.erase(l.begin() + 1); }, "line 2: frame is 0; the plan has 0 frames");
   expect(replace(0, "\"rig_sha256\":\"a", "\"rig_sha256\":\"g"), "rig_sha256 is no SHA-256");
-  expect(replace(1, "\"frame\":0", "\"frame\":3"),
-         "line 2: frame is 3; the plan has frames 0 to 2");
-  expect(replace(1, "\"frame\":0", "\"frame\":-1"), "line 2: frame is -1");
-  expect(replace(1, "frame begun", "frame lost"), "line 2: record is \"frame lost\"");
-  expect(replace(1, "}", ",\"why\":1}"), "line 2: why is not known");
-  expect(replace(2, "\"is\"", "\"was\""), "line 3: is is missing");
-  expect(replace(2, "\"sha256\"", "\"sha\""), "line 3: is.sha256 is missing");
-  expect(replace(2, "\"iso\":100.0", "\"hue\":1"), "line 3: is.exposure_s or f_number or iso");
-  expect(replace(4, "east", "west"), "line 5: is.role and light are not those of the plan");
-  expect([](auto& l) { l.erase(l.begin() + 1); }, "line 2: frame is done, but was not begun");
-  expect([](auto& l) { l.insert(l.begin() + 3, l[1]); }, "line 4: frame is begun again");
-  expect([](auto& l) { l.insert(l.begin() + 3, l[2]); },
-         "line 4: frame is done, but was not begun");
-  expect([](auto& l) { l.erase(l.begin() + 5, l.begin() + 7); }, "line 6: record is complete, but");
-  expect([](auto& l) { l.push_back(l[1]); }, "line 9: record follows the complete one");
-  expect([](auto& l) { l.push_back(l[0]); }, "line 9: ");
-  expect([](auto& l) { l[1] = R"({"record":"frame rejected","frame":0,"reason":"r"})"; },
-         "line 2: frame is rejected, but was not begun");
-  expect([](auto& l) { l[2] = R"({"record":"frame rejected","frame":0,"reason":""})"; },
-         "line 3: reason is empty");
+  expect(replace(2, "\"frame\":0", "\"frame\":3"),
+         "line 3: frame is 3; the plan has 3 frames, from 0");
+  expect(replace(2, "\"frame\":0", "\"frame\":-1"), "line 3: frame is -1");
+  expect(replace(2, "frame begun", "frame lost"), "line 3: record is \"frame lost\"");
+  expect(replace(2, "}", ",\"why\":1}"), "line 3: why is not known");
+  expect(replace(3, "\"is\"", "\"was\""), "line 4: is is missing");
+  expect(replace(3, "\"sha256\"", "\"sha\""), "line 4: is.sha256 is missing");
+  expect(replace(3, "\"iso\":100.0", "\"hue\":1"), "line 4: is.exposure_s or f_number or iso");
+  expect(replace(5, "east", "west"), "line 6: is.role and light are not those of the plan");
+  expect([](auto& l) { l.erase(l.begin() + 2); }, "line 3: frame is done, but was not begun");
+  expect([](auto& l) { l.insert(l.begin() + 4, l[2]); }, "line 5: frame is begun again");
+  expect([](auto& l) { l.insert(l.begin() + 4, l[3]); },
+         "line 5: frame is done, but was not begun");
+  expect([](auto& l) { l.erase(l.begin() + 6, l.begin() + 8); }, "line 7: record is complete, but");
+  expect([](auto& l) { l.push_back(l[2]); }, "line 10: record follows the complete one");
+  expect([](auto& l) { l.push_back(l[0]); }, "line 10: ");
+  expect([](auto& l) { l[2] = R"({"record":"frame rejected","frame":0,"reason":"r"})"; },
+         "line 3: frame is rejected, but was not begun");
+  expect([](auto& l) { l[3] = R"({"record":"frame rejected","frame":0,"reason":""})"; },
+         "line 4: reason is empty");
+}
+
+// A new plan makes every frame open again.
+TEST(Journal, ALaterPlanCountsAlone) {
+  std::vector<std::string> lines = LinesOf(WholeText());
+  lines.insert(lines.begin() + 4, lines[1]);
+  EXPECT_THAT(FailureOfLines(lines), IsError(ErrorCode::kBadData, "not every frame is done"));
+  lines.insert(lines.begin() + 5, {lines[2], lines[3]});
+  const auto journal = ParseJournal(testing::Lines(lines), "j");
+  ASSERT_TRUE(journal) << journal.error().message;
+  EXPECT_TRUE((*journal)->complete);
 }
 
 // A frame that was done and is rejected has to be taken again.
 TEST(Journal, ARejectedFrameIsOpenAgain) {
   std::vector<std::string> lines = LinesOf(WholeText());
-  lines.insert(lines.begin() + 3, R"({"record":"frame rejected","frame":0,"reason":"moved"})");
+  lines.insert(lines.begin() + 4, R"({"record":"frame rejected","frame":0,"reason":"moved"})");
   EXPECT_THAT(FailureOfLines(lines), IsError(ErrorCode::kBadData, "not every frame is done"));
-  lines.insert(lines.begin() + 4, {lines[1], lines[1], lines[2]});  // begun twice: killed once
+  lines.insert(lines.begin() + 5, {lines[2], lines[2], lines[3]});  // begun twice: killed once
   const auto journal = ParseJournal(testing::Lines(lines), "j");
   ASSERT_TRUE(journal) << journal.error().message;
   EXPECT_TRUE((*journal)->complete);
@@ -205,7 +231,7 @@ TEST(Journal, HasOneWriterAtATime) {
 TEST(Journal, AFullDiskLeavesTheRecordsBefore) {
   const TempFolder temp;
   Result<JournalWriter> writer = JournalWriter::Open(temp.Path(), 0);
-  ASSERT_TRUE(writer && writer->Begin(Begun()));
+  ASSERT_TRUE(writer && writer->Begin(Begun()) && writer->Planned(Planned(), "as asked"));
   const std::string before = *ReadFileBytes(temp.Path() / kJournalFile);
   {
     const testing::FullDisk full(before.size() + 10);
@@ -215,7 +241,7 @@ TEST(Journal, AFullDiskLeavesTheRecordsBefore) {
   }
   EXPECT_EQ(*ReadFileBytes(temp.Path() / kJournalFile), before);
   EXPECT_TRUE(writer->FrameBegun(0));
-  EXPECT_EQ(LinesOf(*ReadFileBytes(temp.Path() / kJournalFile)).size(), 2U);
+  EXPECT_EQ(LinesOf(*ReadFileBytes(temp.Path() / kJournalFile)).size(), 3U);
 }
 
 }  // namespace

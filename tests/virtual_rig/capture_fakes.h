@@ -61,6 +61,9 @@ class LitCamera : public TetheredCamera {
   std::vector<Result<void>> fail_next;          // what the next captures fail with, last first
   std::function<void(int capture)> on_exposed;  // in the middle of an exposure; captures from 0
   std::vector<size_t> image_of_channel;         // another wiring; empty: as the rig has it
+  std::vector<double> times_s;                  // that it says it has
+  // Whether the picture gets brighter with the exposure time; 20 ms is what the images are for.
+  bool exposure_counts = false;
   int captures = 0;
   int opened = 0;
 
@@ -72,7 +75,7 @@ class LitCamera : public TetheredCamera {
     settings_ = settings;
     return settings;
   }
-  [[nodiscard]] std::vector<double> ExposureTimes() const override { return {}; }
+  [[nodiscard]] std::vector<double> ExposureTimes() const override { return times_s; }
   Result<CapturedFile> Capture(const std::filesystem::path& folder,
                                std::chrono::milliseconds /*deadline*/) override {
     const int capture = captures++;
@@ -115,7 +118,8 @@ class LitCamera : public TetheredCamera {
       for (const int channel : board_.Lit()) {
         const auto k = static_cast<size_t>(channel);
         const size_t image = image_of_channel.empty() ? k : image_of_channel.at(k);
-        const auto share = static_cast<float>(board_.Level(channel) / kSteps);
+        const double gain = exposure_counts ? settings_.exposure_s / 0.02 : 1.0;
+        const auto share = static_cast<float>(gain * board_.Level(channel) / kSteps);
         for (size_t c = 0; c < 3 && share > 0.0F; ++c) {
           for (size_t p = 0; p < seen[c].pixels.size(); ++p) {
             seen[c].pixels[p] += share * images_.at(image)[c].pixels[p];
@@ -133,7 +137,7 @@ class LitCamera : public TetheredCamera {
 
 inline CaptureOptions QuickCapture() {
   CaptureOptions options;
-  options.settings.exposure_s = 0.02;
+  options.exposure_s = 0.02;
   options.settle = milliseconds(5);
   options.keep_alive = milliseconds(0);
   return options;

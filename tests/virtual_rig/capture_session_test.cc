@@ -2,6 +2,9 @@
 
 #include <gmock/gmock.h>
 
+#include <cmath>
+#include <set>
+
 #include "core/file_io.h"
 #include "scanner/stack_reader.h"
 #include "tests/scanner/captures.h"
@@ -87,7 +90,9 @@ TEST_F(CaptureTest, KeepsSettingsAndLevelInTheRecord) {
   CaptureOptions options = QuickCapture();
   options.kind = SessionKind::kSheet;
   options.level = 0.5;
-  options.settings = {.exposure_s = 0.04, .f_number = 5.6, .iso = 200.0};
+  options.exposure_s = 0.04;
+  options.f_number = 5.6;
+  options.iso = 200.0;
   const Result<CaptureSummary> summary = Begin(options);
   ASSERT_TRUE(summary) << summary.error().message;
   const Result<Session> session = ReadSession(dir_);
@@ -97,6 +102,69 @@ TEST_F(CaptureTest, KeepsSettingsAndLevelInTheRecord) {
   EXPECT_EQ(session->frames[4].iso, 200.0);
   EXPECT_EQ(session->frames[4].exposure_s, 0.04);
   EXPECT_NEAR(board_->Records()[3].highest_level, 0.5, 1e-9);
+}
+
+// The brightest light's 99.9th percentile comes to lie just below its goal, on a camera of third stops.
+TEST_F(CaptureTest, FindsTheExposure) {
+  camera_.exposure_counts = true;
+  for (double time_s = 0.0005; time_s < 2.0; time_s *= std::cbrt(2.0)) {
+    camera_.times_s.push_back(time_s);
+  }
+  CaptureOptions options = QuickCapture();
+  options.exposure_s.reset();
+  double peak = 0.0;
+  std::vector<std::string> stages;
+  Result<CaptureSession> session = CaptureSession::Begin(dir_, rig_file_, options);
+  ASSERT_TRUE(session);
+  const Result<CaptureSummary> summary =
+      session->Run(*host_, camera_, {.threads = 1}, [&](const CaptureEvent& event) {
+        peak = std::max(peak, event.peak);
+        if (stages.empty() || stages.back() != event.stage) {
+          stages.push_back(event.stage);
+        }
+      });
+  ASSERT_TRUE(summary) << summary.error().message;
+  EXPECT_THAT(stages, ::testing::ElementsAre("metering", "capturing", "checking"));
+  EXPECT_LE(peak, 0.85);
+  EXPECT_GT(peak, 0.8 / std::cbrt(2.0) - 0.02);
+  EXPECT_THAT(summary->session.frames, SizeIs(13));
+  EXPECT_TRUE(VerifySession(dir_, {}));
+}
+
+// The rig has led-3 as one of ten alike; in truth it is much brighter.
+TEST_F(CaptureTest, ALightThatIsBrighterThanTheRigSaysShortensTheExposure) {
+  std::vector<Image3> images = LightImages(rig_);
+  for (Image<float>& plane : images[3].planes) {
+    for (float& value : plane.pixels) {
+      value *= 1.5F;
+    }
+  }
+  LitCamera camera(*board_, images);
+  camera.exposure_counts = true;
+  for (double time_s = 0.0005; time_s < 2.0; time_s *= std::cbrt(2.0)) {
+    camera.times_s.push_back(time_s);
+  }
+  CaptureOptions options = QuickCapture();
+  options.exposure_s.reset();
+  options.checks.max_level_change = 0.6;
+  Result<CaptureSession> session = CaptureSession::Begin(dir_, rig_file_, options);
+  ASSERT_TRUE(session);
+  const Result<CaptureSummary> summary = session->Run(*host_, camera, {.threads = 1});
+  ASSERT_TRUE(summary) << summary.error().message;
+  EXPECT_THAT(*ReadFileBytes(dir_ / kJournalFile), HasSubstr("exposure found with light 'led-3'"));
+  std::set<double> exposures_s;
+  for (const SessionFrame& frame : summary->session.frames) {
+    exposures_s.insert(*frame.exposure_s);
+  }
+  EXPECT_THAT(exposures_s, SizeIs(1));  // all frames were taken again
+  EXPECT_TRUE(VerifySession(dir_, {}));
+}
+
+TEST_F(CaptureTest, ACameraWithoutExposureTimesNeedsOne) {
+  CaptureOptions options = QuickCapture();
+  options.exposure_s.reset();
+  EXPECT_THAT(ErrorOf(Begin(options)), IsError(ErrorCode::kInvalidArgument, "--exposure"));
+  EXPECT_TRUE(Begin());  // there was nothing to lose
 }
 
 TEST_F(CaptureTest, ABoardThatRestartsInAnExposureCostsOneFrame) {

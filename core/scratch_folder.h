@@ -1,10 +1,11 @@
 #pragma once
 
 #include <filesystem>
+#include <string_view>
 
 #include "core/error.h"
 
-namespace sateen::cli {
+namespace sateen {
 
 // A folder of its own under $TMPDIR, or /tmp, removed with all in it.
 class ScratchFolder {
@@ -22,9 +23,4 @@ class ScratchFolder {
   std::filesystem::path path_;
 };
 
-// Most memory that the process has held since ResetPeakMemory(), or, where the system cannot do
-// that, since it began.
-[[nodiscard]] double PeakMemoryGb();
-void ResetPeakMemory();
-
-}  // namespace sateen::cli
+}  // namespace sateen

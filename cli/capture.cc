@@ -1,0 +1,178 @@
+#include "cli/capture.h"
+
+#include <chrono>
+#include <ostream>
+#include <utility>
+
+#include "cli/device_options.h"
+#include "cli/quantity.h"
+
+namespace sateen::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+// The words of the command line as a request. Each has been checked when it was parsed.
+Result<CaptureRequest> RequestOf(const CaptureArgs& args) {
+  CaptureRequest request = args.request;
+  CaptureOptions& options = request.options;
+  request.resume = !args.resume.empty();
+  if (request.resume) {
+    request.output = args.resume;
+  }
+  options.kind = args.sheet ? SessionKind::kSheet : SessionKind::kFabric;
+  if (args.exposure != "auto") {
+    const Result<double> exposure_s = ParseExposure(args.exposure);
+    if (!exposure_s) {
+      return tl::unexpected(exposure_s.error());
+    }
+    options.exposure_s = *exposure_s;
+  }
+  const Result<double> level = ParseLevel(args.level);
+  if (!level) {
+    return tl::unexpected(level.error());
+  }
+  options.level = *level;
+  for (const auto& [text, time] :
+       {std::pair{&args.settle, &options.settle}, std::pair{&args.margin, &options.margin},
+        std::pair{&args.deadline, &options.deadline}}) {
+    const Result<std::chrono::milliseconds> parsed = ParseDuration(*text);
+    if (!parsed) {
+      return tl::unexpected(parsed.error());
+    }
+    *time = *parsed;
+  }
+  return options.Validate().map([&] { return std::move(request); });
+}
+
+// "led-3, 1/60 s, peak 78 %, 9 s left"
+std::string StageText(const CaptureEvent& event) {
+  if (event.light.empty()) {
+    return event.stage;
+  }
+  std::string text = event.stage == "metering" ? "metering " + event.light : event.light;
+  text += ", " + ExposureText(event.exposure_s);
+  if (event.peak > 0.0) {
+    text += fmt::format(", peak {:.0f} %", 100.0 * event.peak);
+  }
+  if (event.left_s) {
+    text += fmt::format(", {:.0f} s left", *event.left_s);
+  }
+  return text;
+}
+
+CaptureObserver ShowOn(const Task& task) {
+  return [&task](const CaptureEvent& event) {
+    task.BeginStage(StageText(event), static_cast<int>(event.frames));
+    task.Advance(static_cast<int>(event.done));
+  };
+}
+
+int Report(const Error& error, std::ostream& log) {
+  log << "sateen capture: error: " << error.message << '\n';
+  return ExitStatus(error);
+}
+
+int DryRun(const CaptureArgs& args, const CaptureRequest& request, RigDevices& devices,
+           std::ostream& out, std::ostream& log) {
+  const Result<CaptureForecast> forecast = ForecastCapture(request, devices);
+  if (!forecast) {
+    return Report(forecast.error(), log);
+  }
+  out << (args.json ? ForecastJson(*forecast) : ForecastText(*forecast));
+  return 0;
+}
+
+}  // namespace
+
+void AddCapture(CLI::App& root, CaptureArgs& args) {
+  CLI::App* cmd = root.add_subcommand(
+      "capture",
+      "Capture a session: the dark, a frame under each light, the first light again, the dark "
+      "again; every frame checked");
+  CLI::Option* resume =
+      cmd->add_option("--resume", args.resume,
+                      "Go on with this session after a crash, a power cut or Ctrl-C: frames that "
+                      "are there and whole are kept");
+  CLI::Option* rig = cmd->add_option("--rig", args.request.rig, "Rig file")->excludes(resume);
+  CLI::Option* output =
+      cmd->add_option("-o,--output", args.request.output, "Folder for the session")
+          ->excludes(resume);
+  CaptureOptions& options = args.request.options;
+  cmd->add_flag("--sheet", args.sheet, "It is a sheet of white paper, to calibrate the lights by")
+      ->excludes(resume);
+  cmd->add_option("--exposure", args.exposure,
+                  "Exposure of each frame, as 1/50 or 20ms; auto: by test frames of the brightest "
+                  "light, and several a light where one cannot hold the scene")
+      ->capture_default_str()
+      ->excludes(resume);
+  cmd->add_option("--aperture", options.f_number, "f-number")
+      ->capture_default_str()
+      ->excludes(resume);
+  cmd->add_option("--iso", options.iso, "ISO")->capture_default_str()->excludes(resume);
+  cmd->add_option("--level", args.level, "Level of the lights, 0.1% to 100%")
+      ->capture_default_str()
+      ->excludes(resume);
+  cmd->add_option("--brackets", options.brackets,
+                  "Exposures a light, at most, with --exposure auto; 1 to 3")
+      ->capture_default_str()
+      ->excludes(resume);
+  AddDeviceOptions(*cmd, args.devices);
+  cmd->add_option("--tries", options.tries, "How often a frame is tried before the capture stops")
+      ->capture_default_str();
+  cmd->add_option("--settle", args.settle, "From a light's going on to the exposure")
+      ->capture_default_str();
+  cmd->add_option("--margin", args.margin,
+                  "How much longer than the exposure a light may be on, until the camera has "
+                  "delivered")
+      ->capture_default_str();
+  cmd->add_option("--deadline", args.deadline, "Longest wait for a frame beyond its exposure")
+      ->capture_default_str();
+  cmd->add_flag("--dry-run", args.dry_run,
+                "Look whether the capture could begin, and say what it would do; no frame is "
+                "taken, no file written")
+      ->excludes(resume);
+  cmd->add_flag("--json", args.json, "Print JSON");
+  cmd->final_callback([&args, rig, output] {
+    if (args.resume.empty() && (rig->count() == 0 || output->count() == 0)) {
+      throw CLI::ValidationError("needs --rig and --output, or --resume SESSION");
+    }
+    if (const Result<CaptureRequest> request = RequestOf(args); !request) {
+      throw CLI::ValidationError(request.error().message);
+    }
+  });
+}
+
+int RunCaptureCommand(const CaptureArgs& args, const Task& task, std::ostream& out,
+                      std::ostream& log) {
+  RigDevices devices(args.devices);
+  return RunCaptureWith(args, devices, task, out, log);
+}
+
+int RunCaptureWith(const CaptureArgs& args, RigDevices& devices, const Task& task,
+                   std::ostream& out, std::ostream& log) {
+  const Result<CaptureRequest> request = RequestOf(args);
+  if (!request) {
+    return Report(request.error(), log);
+  }
+  if (args.dry_run) {
+    return DryRun(args, *request, devices, out, log);
+  }
+  const auto start = std::chrono::steady_clock::now();
+  const Result<CaptureSummary> summary = RunCapture(*request, devices, task, ShowOn(task));
+  task.ClearProgress();
+  if (!summary) {
+    return Report(summary.error(), log);
+  }
+  const Result<Rig> rig = ReadRig(request->output / summary->session.rig);
+  if (!rig) {
+    return Report(rig.error(), log);
+  }
+  const double seconds =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  out << (args.json ? CaptureJson(request->output, *rig, *summary, seconds)
+                    : CaptureText(request->output, *rig, *summary, seconds));
+  return 0;
+}
+
+}  // namespace sateen::cli

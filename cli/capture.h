@@ -1,0 +1,44 @@
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <filesystem>
+#include <iosfwd>
+#include <string>
+
+#include "core/task.h"
+#include "scanner/capture_request.h"
+
+namespace sateen::cli {
+
+struct CaptureArgs {
+  CaptureRequest request;
+  std::filesystem::path resume;  // the session to go on with; empty: a new one
+  RigDeviceNames devices;
+  bool sheet = false;
+  std::string exposure = "auto";
+  std::string level = "100%";
+  std::string settle = "30ms";
+  std::string margin = "6s";
+  std::string deadline = "30s";
+  bool dry_run = false;
+  bool json = false;
+};
+
+void AddCapture(CLI::App& root, CaptureArgs& args);
+
+// Returns the exit status.
+int RunCaptureCommand(const CaptureArgs& args, const Task& task, std::ostream& out,
+                      std::ostream& log);
+// The same on devices that a test gives.
+int RunCaptureWith(const CaptureArgs& args, RigDevices& devices, const Task& task,
+                   std::ostream& out, std::ostream& log);
+
+// What a capture and a dry run report, as text and as JSON (docs/formats.md).
+[[nodiscard]] std::string CaptureText(const std::filesystem::path& session, const Rig& rig,
+                                      const CaptureSummary& summary, double seconds);
+[[nodiscard]] std::string CaptureJson(const std::filesystem::path& session, const Rig& rig,
+                                      const CaptureSummary& summary, double seconds);
+[[nodiscard]] std::string ForecastText(const CaptureForecast& forecast);
+[[nodiscard]] std::string ForecastJson(const CaptureForecast& forecast);
+
+}  // namespace sateen::cli

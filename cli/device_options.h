@@ -1,0 +1,21 @@
+#pragma once
+
+#include <CLI/CLI.hpp>
+
+#include "scanner/rig_devices.h"
+
+namespace sateen::cli {
+
+// --port and --camera.
+inline void AddDeviceOptions(CLI::App& cmd, RigDeviceNames& devices) {
+  cmd.add_option("--port", devices.port,
+                 "Serial port of the LED board, as /dev/ttyACM0; default: the one whose USB id is "
+                 "an Arduino's")
+      ->envname("SATEEN_PORT");
+  cmd.add_option("--camera", devices.camera,
+                 "Camera: usb:BUS,DEVICE, ptpip:ADDRESS, or folder:DIR for files that another "
+                 "program drops; default: the only one on USB")
+      ->envname("SATEEN_CAMERA");
+}
+
+}  // namespace sateen::cli

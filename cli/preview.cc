@@ -1,0 +1,82 @@
+#include "cli/preview.h"
+
+#include <ostream>
+
+#include "cli/device_options.h"
+#include "cli/quantity.h"
+#include "core/output_folder.h"
+
+namespace sateen::cli {
+namespace {
+
+Result<PreviewRequest> PreviewRequestOf(const PreviewArgs& args) {
+  PreviewRequest request = args.request;
+  if (!args.light.empty()) {
+    request.light = args.light;
+  }
+  if (args.exposure != "auto") {
+    const Result<double> exposure_s = ParseExposure(args.exposure);
+    if (!exposure_s) {
+      return tl::unexpected(exposure_s.error());
+    }
+    request.exposure_s = *exposure_s;
+  }
+  const Result<double> level = ParseLevel(args.level);
+  if (!level) {
+    return tl::unexpected(level.error());
+  }
+  request.level = *level;
+  return request.Validate().map([&] { return request; });
+}
+
+}  // namespace
+
+void AddPreview(CLI::App& root, PreviewArgs& args) {
+  CLI::App* cmd = root.add_subcommand(
+      "preview",
+      "Take one frame and write it as a JPEG to look at: framing, focus, exposure; magenta where "
+      "it saturates");
+  PreviewRequest& request = args.request;
+  cmd->add_option("-o,--output", args.output, "JPEG file")->capture_default_str();
+  cmd->add_option("--light", args.light,
+                  "Name (of --rig) or channel of the light that is on; default: room light alone");
+  cmd->add_option("--rig", request.rig, "Rig file: names of lights, white balance");
+  cmd->add_option("--exposure", args.exposure, "Exposure, as 1/50 or 20ms; auto: by test frames")
+      ->capture_default_str();
+  cmd->add_option("--aperture", request.f_number, "f-number")->capture_default_str();
+  cmd->add_option("--iso", request.iso, "ISO")->capture_default_str();
+  cmd->add_option("--level", args.level, "Level of the light, 0.1% to 100%")->capture_default_str();
+  cmd->add_option("--max-width", request.max_width, "Widest picture, 16 to 16384 px")
+      ->capture_default_str();
+  AddDeviceOptions(*cmd, args.devices);
+  cmd->final_callback([&args] {
+    if (const Result<PreviewRequest> parsed = PreviewRequestOf(args); !parsed) {
+      throw CLI::ValidationError(parsed.error().message);
+    }
+  });
+}
+
+int RunPreview(const PreviewArgs& args, const Task& task, std::ostream& out, std::ostream& log) {
+  RigDevices devices(args.devices);
+  return RunPreviewWith(args, devices, task, out, log);
+}
+
+int RunPreviewWith(const PreviewArgs& args, RigDevices& devices, const Task& task,
+                   std::ostream& out, std::ostream& log) {
+  const Result<PreviewRequest> request = PreviewRequestOf(args);
+  const Result<Preview> preview =
+      request ? TakePreview(*request, devices, task) : tl::unexpected(request.error());
+  const Status written =
+      preview ? WriteFileWhole(args.output, preview->jpeg) : tl::unexpected(preview.error());
+  if (!written) {
+    log << "sateen preview: error: " << written.error().message << '\n';
+    return ExitStatus(written.error());
+  }
+  out << fmt::format("{}: {}x{} px, {}, f/{:g}, ISO {:g}; peak at {:.0f} % of what saturates\n",
+                     args.output.string(), preview->size_px.width, preview->size_px.height,
+                     ExposureText(preview->settings.exposure_s), preview->settings.f_number,
+                     preview->settings.iso, 100.0 * preview->levels.peak);
+  return 0;
+}
+
+}  // namespace sateen::cli

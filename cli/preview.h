@@ -1,0 +1,30 @@
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <filesystem>
+#include <iosfwd>
+#include <string>
+
+#include "core/task.h"
+#include "scanner/preview.h"
+
+namespace sateen::cli {
+
+struct PreviewArgs {
+  PreviewRequest request;
+  RigDeviceNames devices;
+  std::filesystem::path output = "preview.jpg";
+  std::string light;  // empty: room light alone
+  std::string exposure = "auto";
+  std::string level = "100%";
+};
+
+void AddPreview(CLI::App& root, PreviewArgs& args);
+
+// Returns the exit status.
+int RunPreview(const PreviewArgs& args, const Task& task, std::ostream& out, std::ostream& log);
+// The same on devices that a test gives.
+int RunPreviewWith(const PreviewArgs& args, RigDevices& devices, const Task& task,
+                   std::ostream& out, std::ostream& log);
+
+}  // namespace sateen::cli

@@ -1,0 +1,298 @@
+// The frames of a CaptureSession, one by one.
+#include <algorithm>
+#include <deque>
+#include <utility>
+
+#include "core/file_io.h"
+#include "core/output_folder.h"
+#include "scanner/capture_session.h"
+#include "scanner/exposure_search.h"
+#include "scanner/folder_listing.h"
+#include "scanner/lit_exposure.h"
+
+namespace sateen {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kIncoming = "incoming";
+constexpr double kFabricPeak = 0.8;  // of what saturates
+constexpr double kSheetPeak = 0.6;   // its readings must be proportional to 0.2 %
+constexpr double kClippedPeak = 0.98;
+constexpr int kMostTests = 8;  // frames to find an exposure by
+
+std::string SafeName(std::string name) {
+  for (char& c : name) {
+    const bool is_safe = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') ||
+                         (c >= '0' && c <= '9') || c == '-' || c == '_' || c == '.';
+    c = is_safe ? c : '_';
+  }
+  return name;
+}
+
+// "frames/03-led-2.dng"; "frames/04-led-2.dng" is the same light's next exposure.
+std::string FileNameOf(std::size_t frame, const SessionFrame& planned, const fs::path& delivered) {
+  const std::string name = planned.role == FrameRole::kDark ? "dark" : SafeName(planned.light);
+  return fmt::format("frames/{:02}-{}{}{}", frame, name,
+                     planned.role == FrameRole::kRepeat ? "-again" : "",
+                     LowerCase(delivered.extension().string()));
+}
+
+Status MakeEmptyFolder(const fs::path& path) {
+  std::error_code error;  // what cannot be removed is in nobody's way
+  fs::remove_all(path, error);
+  fs::create_directories(path, error);
+  if (error) {
+    return Fail(ErrorCode::kIo, "{}: cannot create this folder: {}", path.string(),
+                error.message());
+  }
+  return {};
+}
+
+bool MayBeTriedAgain(ErrorCode code) {
+  return code == ErrorCode::kBadData || code == ErrorCode::kDevice || code == ErrorCode::kTimeout;
+}
+
+// The light that gives the table most, by the rig.
+std::size_t BrightestLight(const Rig& rig) {
+  std::size_t brightest = 0;
+  double most = 0.0;
+  for (std::size_t k = 0; k < rig.lights.size(); ++k) {
+    const Incident incident = IncidentAt(rig.lights[k], Eigen::Vector3d::Zero());
+    const double given = incident.e_rgb.maxCoeff() * std::max(0.0, incident.l.z());
+    if (given > most) {
+      most = given;
+      brightest = k;
+    }
+  }
+  return brightest;
+}
+
+}  // namespace
+
+Result<ExposureSettings> CaptureSession::Configure(double exposure_s, TetheredCamera& camera) {
+  if (configured_ && configured_->asked_s == exposure_s) {
+    return configured_->settings;
+  }
+  configured_.reset();
+  const Result<ExposureSettings> set = camera.Configure(
+      {.exposure_s = exposure_s, .f_number = journal_.begun.f_number, .iso = journal_.begun.iso});
+  if (set) {
+    configured_ = Configured{exposure_s, *set};
+  }
+  return set;
+}
+
+Status CaptureSession::MakePlan(Tools& tools) {
+  FramePlan plan;
+  std::string reason;
+  if (journal_.begun.exposure_s) {
+    plan = PlanOf(rig_, {*journal_.begun.exposure_s});
+    reason = "exposure as asked";
+  } else {
+    const std::size_t light = brighter_.value_or(BrightestLight(rig_));
+    const Result<std::vector<double>> exposures_s = Meter(light, tools);
+    if (!exposures_s) {
+      return tl::unexpected(exposures_s.error());
+    }
+    plan = PlanOf(rig_, *exposures_s);
+    reason = fmt::format("exposure found with light '{}'", rig_.lights[light].name);
+  }
+  brighter_.reset();
+  return writer_.Planned(plan, reason).map([&] {
+    journal_.plan = std::move(plan);
+    journal_.done.assign(journal_.plan.size(), std::nullopt);
+    looks_.clear();
+    looks_.resize(journal_.plan.size());
+  });
+}
+
+Result<std::vector<double>> CaptureSession::Meter(std::size_t light, Tools& tools) {
+  const Light& lit = rig_.lights[light];
+  Status ready = MakeEmptyFolder(dir_ / kIncoming);
+  if (ready && tools.board.state() != LightBoard::State::kReady) {
+    ready = tools.board.Connect();
+  }
+  if (!ready) {
+    return tl::unexpected(ready.error());
+  }
+  const bool is_sheet = journal_.begun.kind == SessionKind::kSheet;
+  Result<ExposureSearch> search =
+      ExposureSearch::Begin(tools.camera.ExposureTimes(),
+                            {.peak = is_sheet ? kSheetPeak : kFabricPeak,
+                             .low = DarkestUseful(rig_.response),
+                             .most = is_sheet ? 1 : journal_.begun.brackets,
+                             .longest_s = LongestExposure(tools.board.Info(), lit, options_)});
+  for (int test = 0; search && !search->Found(); ++test) {
+    Tell(tools, "metering", lit.name, search->TestTime());
+    const Result<ExposureSettings> set = Configure(search->TestTime(), tools.camera);
+    const Result<CapturedFile> file =
+        set ? ExposeLit(tools.board, tools.camera, {&lit, journal_.begun.level, set->exposure_s},
+                        options_, dir_ / kIncoming, tools.task)
+            : tl::unexpected(set.error());
+    const Result<SignalLevels> levels =
+        file ? ReadSignalLevels({.path = file->path, .response = rig_.response})
+             : tl::unexpected(file.error());
+    Status taken = levels ? search->Take(*levels) : tl::unexpected(levels.error());
+    if (taken && test == kMostTests) {
+      taken =
+          Fail(ErrorCode::kDevice, "no exposure found in {} test frames; give --exposure", test);
+    }
+    if (!taken) {
+      return Fail(taken.error().code, "test frame of light '{}': {}", lit.name,
+                  taken.error().message);
+    }
+    peak_ = levels->peak;
+    std::error_code ignored;
+    fs::remove(file->path, ignored);
+  }
+  return search.map([](const ExposureSearch& found) { return found.Exposures(); });
+}
+
+Result<CaptureSession::Arrived> CaptureSession::Shoot(std::size_t frame, int attempt,
+                                                      Tools& tools) {
+  const SessionFrame& planned = journal_.plan[frame];
+  // A folder of its own, since the frame before may still lie in its own.
+  const fs::path folder = dir_ / kIncoming / fmt::format("{:02}-{}", frame, attempt);
+  if (const Status made = MakeEmptyFolder(folder); !made) {
+    return tl::unexpected(made.error());
+  }
+  const Result<ExposureSettings> set = Configure(*planned.exposure_s, tools.camera);
+  if (!set) {
+    return tl::unexpected(set.error());
+  }
+  const Result<CapturedFile> file =
+      ExposeLit(tools.board, tools.camera, {LightOf(frame), journal_.begun.level, set->exposure_s},
+                options_, folder, tools.task);
+  if (!file) {
+    return tl::unexpected(file.error());
+  }
+  Arrived arrived{.frame = frame, .record = planned, .path = file->path};
+  arrived.record.exposure_s = set->exposure_s;
+  arrived.record.f_number = set->f_number;
+  arrived.record.iso = set->iso;
+  arrived.record.file = FileNameOf(frame, planned, file->path);
+  FrameCheckOptions checks = options_.checks;
+  if (!IsBase(frame) || !journal_.begun.exposure_s) {
+    // What a longer exposure loses, the shorter one has; and what was found is found again.
+    checks.max_saturated = 1.0;
+  }
+  arrived.looked = std::async(
+      std::launch::async,
+      [this, checks, settings = *set, role = planned.role, place = dir_ / arrived.record.file,
+       of = FrameFile{file->path, arrived.record.Exposure(), std::nullopt, rig_.response}] {
+        Result<Looked> looked =
+            CheckFrame(of, rig_, settings, role, checks).and_then([&](FrameLook look) {
+              return ReadSignalLevels(of).map([&](SignalLevels levels) {
+                return Looked{std::move(look), levels};
+              });
+            });
+        const Status flushed = looked ? FlushToDisk(of.path, place) : Status{};
+        return flushed ? std::move(looked) : Result<Looked>(tl::unexpected(flushed.error()));
+      });
+  return arrived;
+}
+
+// From incoming/ to where the record says.
+Status CaptureSession::Place(const Arrived& arrived, SessionFrame& record) {
+  const fs::path place = dir_ / record.file;
+  std::error_code error;
+  fs::rename(arrived.path, place, error);
+  if (error) {
+    return Fail(ErrorCode::kIo, "{}: cannot put in place: {}", place.string(), error.message());
+  }
+  fs::remove_all(arrived.path.parent_path(), error);
+  return FlushToDisk(place.parent_path(), place.parent_path());
+}
+
+Status CaptureSession::Settle(Arrived arrived, Tools& tools) {
+  Result<Looked> looked = arrived.looked.get();
+  if (!looked) {
+    return tl::unexpected(looked.error());
+  }
+  const std::size_t frame = arrived.frame;
+  peak_ = looked->levels.peak;
+  if (!journal_.begun.exposure_s && IsBase(frame) && LightOf(frame) != nullptr &&
+      peak_ >= kClippedPeak) {
+    brighter_ = static_cast<std::size_t>(LightOf(frame) - rig_.lights.data());
+    return writer_.FrameRejected(
+        frame, fmt::format("light '{}' is brighter than the exposure allows", NameOf(frame)));
+  }
+  arrived.record.sha256 = looked->look.means.sha256;
+  Status placed = Place(arrived, arrived.record).and_then([&] {
+    return writer_.FrameDone(frame, arrived.record);
+  });
+  if (placed) {
+    looks_[frame] = std::move(looked->look);
+    journal_.done[frame] = std::move(arrived.record);
+    ++taken_;
+    Tell(tools, "capturing", "", 0.0);
+  }
+  return placed;
+}
+
+Status CaptureSession::TakeAgain(Error error, std::size_t frame, int attempt, Tools& tools) {
+  if (!MayBeTriedAgain(error.code)) {
+    return tl::unexpected(std::move(error));
+  }
+  if (Status rejected = Reject(frame, error.message); !rejected) {
+    return rejected;
+  }
+  error.message =
+      fmt::format("frame {} of {} ({}): {}{}", frame + 1, journal_.plan.size(), NameOf(frame),
+                  error.message, attempt > 1 ? fmt::format("; tried {} times", attempt) : "");
+  if (attempt == options_.tries) {
+    return tl::unexpected(std::move(error));
+  }
+  if (error.code == ErrorCode::kDevice || error.code == ErrorCode::kTimeout) {
+    configured_.reset();
+    if (const Result<CameraInfo> again = tools.camera.Open(); !again) {
+      return Fail(again.error().code, "{}; and then: {}", error.message, again.error().message);
+    }
+  }
+  return {};
+}
+
+Status CaptureSession::TakeOpenFrames(Tools& tools) {
+  const std::vector<std::size_t> in_order = Open();
+  std::deque<std::size_t> open(in_order.begin(), in_order.end());
+  std::vector<int> attempts(journal_.plan.size());
+  std::optional<Arrived> arrived;  // looked at while the next frame is being taken
+  Status status;
+  const auto again = [&](const Error& error, std::size_t frame) {
+    open.push_front(frame);
+    return TakeAgain(error, frame, attempts[frame], tools);
+  };
+  while (status && !brighter_ && (!open.empty() || arrived)) {
+    std::optional<Arrived> next;
+    if (!open.empty()) {
+      const std::size_t frame = open.front();
+      open.pop_front();
+      Tell(tools, "capturing", NameOf(frame), *journal_.plan[frame].exposure_s);
+      status = writer_.FrameBegun(frame);
+      Result<Arrived> shot =
+          status ? Shoot(frame, ++attempts[frame], tools) : tl::unexpected(status.error());
+      if (shot) {
+        next = *std::move(shot);
+      } else if (status) {
+        status = again(shot.error(), frame);
+      }
+    }
+    if (arrived) {
+      const std::size_t frame = arrived->frame;
+      const Status settled = Settle(*std::exchange(arrived, std::nullopt), tools);
+      if (!settled) {
+        const Status taken_again = again(settled.error(), frame);
+        status = status ? taken_again : status;
+      }
+    }
+    arrived = std::move(next);
+  }
+  if (arrived) {  // what arrived before it went wrong is not lost
+    const Status settled = Settle(*std::move(arrived), tools);
+    status = status && !settled && !brighter_ ? settled : status;
+  }
+  return status;
+}
+
+}  // namespace sateen
