@@ -10,6 +10,7 @@
 #include <exception>
 #include <memory>
 #include <string_view>
+#include <utility>
 
 #include "core/check.h"
 #include "core/output_folder.h"
@@ -298,23 +299,32 @@ Status DngHeader::Validate() const {
   return status;
 }
 
-Status WriteDng(const std::filesystem::path& path, const Image<uint16_t>& mosaic,
-                const DngHeader& header) {
+Result<std::string> EncodeDng(const Image<uint16_t>& mosaic, const DngHeader& header) {
   if (Status status = header.Validate(); !status) {
-    return status;
+    return tl::unexpected(status.error());
   }
   if (Status status = CheckSize(mosaic.Size()); !status) {
-    return status;
+    return tl::unexpected(status.error());
   }
   SATEEN_CHECK(mosaic.pixels.size() == mosaic.Size().PixelCount());
   MemoryFile file;
   constexpr size_t kTagBytes = 8192;  // they take less than one
   file.bytes.reserve(mosaic.pixels.size() * sizeof(uint16_t) + kTagBytes);
   if (!DngWriter(file).Write(mosaic, header)) {
-    return Fail(ErrorCode::kIo, "{}: libtiff cannot lay out the file; memory may be short",
-                path.string());
+    return Fail(ErrorCode::kIo, "libtiff cannot lay out the DNG file; memory may be short");
   }
-  return WriteFileWhole(path, file.bytes);
+  return std::move(file.bytes);
+}
+
+Status WriteDng(const std::filesystem::path& path, const Image<uint16_t>& mosaic,
+                const DngHeader& header) {
+  const Result<std::string> bytes = EncodeDng(mosaic, header);
+  if (!bytes) {
+    const Error& error = bytes.error();
+    return error.code == ErrorCode::kIo ? Fail(error.code, "{}: {}", path.string(), error.message)
+                                        : tl::unexpected(error);
+  }
+  return WriteFileWhole(path, *bytes);
 }
 
 }  // namespace sateen

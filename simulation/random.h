@@ -8,6 +8,12 @@ namespace sateen {
 // same in whatever order, and on however many threads, the samples are drawn.
 
 // SplitMix64 (Steele, Lea, Flood, "Fast splittable pseudorandom number generators", 2014).
+[[nodiscard]] inline uint64_t MixBits(uint64_t x) {
+  x += 0x9e3779b97f4a7c15U;
+  x = (x ^ (x >> 30U)) * 0xbf58476d1ce4e5b9U;
+  x = (x ^ (x >> 27U)) * 0x94d049bb133111ebU;
+  return x ^ (x >> 31U);
+}
 [[nodiscard]] uint64_t HashOf(uint64_t seed, uint64_t counter);
 
 // Uniform in (0, 1].

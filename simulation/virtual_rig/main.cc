@@ -1,44 +1,39 @@
-#include <fcntl.h>
 #include <poll.h>
 #include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <CLI/CLI.hpp>
 #include <array>
 #include <cerrno>
 #include <csignal>
 #include <cstdlib>
-#include <cstring>
 #include <filesystem>
 #include <iostream>
 #include <memory>
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/file_io.h"
 #include "core/interrupt.h"
 #include "rig/rig.h"
+#include "simulation/virtual_rig/child_command.h"
+#include "simulation/virtual_rig/light_log.h"
+#include "simulation/virtual_rig/rig_args.h"
+#include "simulation/virtual_rig/rig_camera.h"
+#include "simulation/virtual_rig/rig_commands.h"
 #include "simulation/virtual_rig/rig_loop.h"
 
+namespace sateen {
 namespace {
 
 namespace fs = std::filesystem;
-using sateen::Error;
-using sateen::ErrorCode;
-using sateen::Fail;
-using sateen::Result;
-using sateen::Status;
 
-struct Args {
-  std::string rig;
-  std::string firmware;  // empty: ours for as many lights
-  int lights = 14;
-  std::string port_link;
-  std::string events;
-  bool opening_resets = false;
-  std::vector<std::string> command;
-};
+void Complain(const Error& error) {
+  // In one piece: it may come from any thread.
+  std::cerr << fmt::format("sateen-virtual-rig: error: {}\n", error.message);
+}
 
 // Beside this program, where the build and `make install` put what belongs to it.
 fs::path FindBeside(const std::vector<std::string>& candidates) {
@@ -52,19 +47,22 @@ fs::path FindBeside(const std::vector<std::string>& candidates) {
   return folder / candidates.front();
 }
 
-Result<std::vector<std::string>> LightNames(const std::string& path, int lights) {
+// Names of the lights by channel: of the rig file, else of the scene's rig.
+Result<std::vector<std::string>> LightNames(const RigArgs& args, int lights) {
   std::vector<std::string> names;
+  const std::string& scene = args.camera.scene;
+  const std::string path = args.rig.empty() ? scene : args.rig;
   if (path.empty()) {
     return names;
   }
-  const Result<sateen::Rig> rig = sateen::ReadRig(path);
+  const Result<Rig> rig = args.rig.empty() ? ReadSceneRig(scene) : ReadRig(args.rig);
   if (!rig) {
     return tl::unexpected(rig.error());
   }
   for (int k = 0; k < lights; ++k) {
     names.push_back(fmt::format("channel {}", k));
   }
-  for (const sateen::Light& light : rig->lights) {
+  for (const Light& light : rig->lights) {
     if (light.channel < 0 || light.channel >= lights) {
       return Fail(ErrorCode::kBadData,
                   "{}: light '{}' is on channel {}; the board has channels 0 to {}", path,
@@ -72,82 +70,46 @@ Result<std::vector<std::string>> LightNames(const std::string& path, int lights)
     }
     names[static_cast<size_t>(light.channel)] = light.name;
   }
+  if (!scene.empty() && !args.rig.empty()) {
+    const Result<Rig> scene_rig = ReadSceneRig(scene);
+    const Status same = scene_rig ? RequireSameRig(*scene_rig, scene, *rig, args.rig)
+                                  : tl::unexpected(scene_rig.error());
+    if (!same) {
+      return tl::unexpected(same.error());
+    }
+  }
   return names;
 }
 
 // What a program is started with that shall take the virtual board for a serial port.
-Result<sateen::RigLoop::Environment> PreloadEnvironment(const sateen::VirtualPort& port) {
+Result<RigLoop::Environment> PreloadEnvironment(const VirtualPort& port) {
   const fs::path preload =
       FindBeside({"libsateen-virtual-port.so", "../lib/sateen/libsateen-virtual-port.so"});
   if (!fs::exists(preload)) {
     return Fail(ErrorCode::kIo, "{}: is not there; build the target sateen-virtual-port",
                 preload.string());
   }
-  // This program has one thread.
+  // This program has one thread yet.
   const char* before = std::getenv("LD_PRELOAD");  // NOLINT(concurrency-mt-unsafe)
-  const std::string others = before != nullptr && *before != '\0' ? ":" + std::string(before) : "";
-  return sateen::RigLoop::Environment{{"LD_PRELOAD", preload.string() + others},
-                                      {"SATEEN_VIRTUAL_PORT", port.Folder().string()}};
+  const std::string others = before != nullptr && *before != '\0' ? fmt::format(":{}", before) : "";
+  return RigLoop::Environment{{"LD_PRELOAD", preload.string() + others},
+                              {"SATEEN_VIRTUAL_PORT", port.Folder().string()}};
 }
 
-Result<pid_t> StartCommand(const std::vector<std::string>& command,
-                           const sateen::RigLoop::Environment& environment) {
-  std::vector<char*> words;
-  words.reserve(command.size() + 1);
-  for (const std::string& word : command) {
-    words.push_back(const_cast<char*>(word.c_str()));  // execvp() does not write to them
-  }
-  words.push_back(nullptr);
-  // By what the child writes into it, exec failed; when it is closed, exec went well.
-  std::array<int, 2> report = {};
-  if (pipe2(report.data(), O_CLOEXEC) != 0) {
-    return Fail(ErrorCode::kIo, "no pipe: {}", sateen::SystemReason(errno));
-  }
-  const pid_t child = fork();
-  if (child == 0) {
-    for (const auto& [name, value] : environment) {
-      setenv(name.c_str(), value.c_str(), 1);  // NOLINT(concurrency-mt-unsafe)
-    }
-    execvp(words[0], words.data());
-    const int reason = errno;
-    const ssize_t ignored = write(report[1], &reason, sizeof reason);
-    _exit(ignored > 0 ? 127 : 126);
-  }
-  close(report[1]);
-  int reason = child < 0 ? errno : 0;
-  if (child > 0 && read(report[0], &reason, sizeof reason) != sizeof reason) {
-    reason = 0;
-  }
-  close(report[0]);
-  if (reason != 0) {
-    if (child > 0) {
-      waitpid(child, nullptr, 0);
-    }
-    return Fail(ErrorCode::kInvalidArgument, "'{}' cannot be started: {}", command[0],
-                sateen::SystemReason(reason));
-  }
-  return child;
-}
-
-// As a shell has it: 128 and the signal's number where it was killed.
-int ExitStatusOf(int wait_status) {
-  return WIFEXITED(wait_status) ? WEXITSTATUS(wait_status) : 128 + WTERMSIG(wait_status);
-}
-
-int RunCommand(const Args& args, sateen::RigLoop& loop,
-               const sateen::RigLoop::Environment& environment) {
+Result<int> RunCommand(const RigArgs& args, RigLoop& loop, RigCommands& commands,
+                       const RigLoop::Environment& environment) {
   const Result<pid_t> child = StartCommand(args.command, environment);
   if (!child) {
-    std::cerr << "sateen-virtual-rig: error: " << child.error().message << '\n';
-    return ExitStatus(child.error());
+    return tl::unexpected(child.error());
   }
   int wait_status = 0;
   bool told = false;
   while (waitpid(*child, &wait_status, WNOHANG) == 0) {
     // Ctrl-C reaches the command by itself; SIGTERM to this program does not.
-    if (sateen::InterruptFlag() && !std::exchange(told, true)) {
+    if (InterruptFlag() && !std::exchange(told, true)) {
       kill(*child, SIGTERM);
     }
+    commands.Step();
     loop.Step();
   }
   return ExitStatusOf(wait_status);
@@ -157,7 +119,7 @@ int RunCommand(const Args& args, sateen::RigLoop& loop,
 class CommandReader {
  public:
   // False once told to quit.
-  bool Step(sateen::RigLoop& loop) {
+  bool Step(RigCommands& commands) {
     pollfd input = {.fd = 0, .events = POLLIN, .revents = 0};
     if (ended_ || poll(&input, 1, 0) != 1) {
       return true;
@@ -172,8 +134,9 @@ class CommandReader {
       if (line == "quit") {
         return false;
       }
-      if (const Status done = loop.Command(line); !done && !line.empty()) {
-        std::cerr << "sateen-virtual-rig: error: " << done.error().message << '\n';
+      const Status done = line.empty() ? Status() : commands.Do(line);
+      if (!done) {
+        Complain(done.error());
       }
     }
     return true;
@@ -184,35 +147,83 @@ class CommandReader {
   std::string text_;
 };
 
-int Serve(sateen::RigLoop& loop, const sateen::RigLoop::Environment& environment) {
+int Serve(RigLoop& loop, RigCommands& commands, const RigLoop::Environment& environment) {
   std::string exports = "export";
   for (const auto& [name, value] : environment) {
     exports += fmt::format(" {}='{}'", name, value);
   }
   std::cerr << exports << '\n';
-  CommandReader commands;
-  while (!sateen::InterruptFlag() && commands.Step(loop)) {
+  CommandReader reader;
+  while (!InterruptFlag() && reader.Step(commands)) {
+    commands.Step();
     loop.Step();
   }
   return 0;
 }
 
-Result<int> Run(const Args& args) {
+// Actions for the start; those for captures go to `commands`.
+Result<std::vector<RigAction>> ParseCommands(const RigArgs& args, RigCommands& commands) {
+  std::vector<RigAction> actions;
+  for (const std::string& line : args.faults) {
+    Result<RigAction> action = commands.Parse(line);
+    if (!action) {
+      return tl::unexpected(action.error());
+    }
+    actions.push_back(*std::move(action));
+  }
+  for (const std::string& text : args.scheduled) {
+    if (const Status scheduled = commands.Schedule(text); !scheduled) {
+      return tl::unexpected(scheduled.error());
+    }
+  }
+  return actions;
+}
+
+Result<int> RunRig(const RigArgs& args, const std::string& firmware, RigLoop& loop, LightLog& log,
+                   RigLoop::Environment environment) {
+  RigCommands commands(loop, Complain);
+  std::unique_ptr<RigCamera> camera;
+  if (!args.camera.scene.empty()) {
+    auto started = RigCamera::Start(args.camera, log, loop, commands, {.cancel = &InterruptFlag()});
+    if (!started) {
+      return tl::unexpected(started.error());
+    }
+    camera = *std::move(started);
+    environment["SATEEN_CAMERA"] = camera->PortName();
+  }
+  const Result<std::vector<RigAction>> actions = ParseCommands(args, commands);
+  if (!actions) {
+    return tl::unexpected(actions.error());
+  }
+  loop.Start(firmware, environment);
+  for (const RigAction& action : *actions) {
+    if (const Status done = action.act(); !done) {
+      return tl::unexpected(done.error());
+    }
+  }
+  Result<int> status = args.command.empty() ? Serve(loop, commands, environment)
+                                            : RunCommand(args, loop, commands, environment);
+  commands.Step();  // what the camera has said
+  loop.End();
+  return status;
+}
+
+Result<int> Run(const RigArgs& args) {
   const std::string image =
       args.lights == 16 ? "sateen-controller-16.hex" : "sateen-controller.hex";
   const std::string firmware =
       args.firmware.empty() ? FindBeside({"../avr/" + image, "../share/sateen/" + image}).string()
                             : args.firmware;
-  auto board = sateen::VirtualBoard::Load(firmware, sateen::ControllerWiring(args.lights));
+  auto board = VirtualBoard::Load(firmware, ControllerWiring(args.lights));
   if (!board) {
     return tl::unexpected(board.error());
   }
-  auto names = LightNames(args.rig, (*board)->LightCount());
+  auto names = LightNames(args, (*board)->LightCount());
   if (!names) {
     return tl::unexpected(names.error());
   }
-  auto port = sateen::VirtualPort::Open(
-      {}, args.port_link.empty() ? std::nullopt : std::optional(args.port_link));
+  auto port =
+      VirtualPort::Open({}, args.port_link.empty() ? std::nullopt : std::optional(args.port_link));
   if (!port) {
     return tl::unexpected(port.error());
   }
@@ -220,72 +231,37 @@ Result<int> Run(const Args& args) {
   if (!environment) {
     return tl::unexpected(environment.error());
   }
-  const bool serve = args.command.empty();
   std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(nullptr, &std::fclose);
   if (!args.events.empty()) {
     file.reset(std::fopen(args.events.c_str(), "we"));
     if (file == nullptr) {
-      return Fail(ErrorCode::kIo, "{}: cannot be written: {}", args.events,
-                  sateen::SystemReason(errno));
+      return Fail(ErrorCode::kIo, "{}: cannot be written: {}", args.events, SystemReason(errno));
     }
   }
-  std::FILE* events = file != nullptr ? file.get() : serve ? stdout : nullptr;
+  std::FILE* events = file != nullptr ? file.get() : args.command.empty() ? stdout : nullptr;
   prctl(PR_SET_TIMERSLACK, 1000UL);  // or each wait of 100 us takes 50 us longer
-  sateen::RigLoop loop(**board, *port,
-                       {.names = *names, .opening_resets = args.opening_resets, .events = events});
-  loop.Start(firmware, *environment);
-  const int status = serve ? Serve(loop, *environment) : RunCommand(args, loop, *environment);
-  loop.End();
-  return status;
-}
-
-void AddOptions(CLI::App& app, Args& args) {
-  app.add_option("--rig", args.rig, "Rig file; names the lights in the events");
-  app.add_option("--lights", args.lights, "Lights of the board, 14 or 16")
-      ->check(CLI::IsMember({14, 16}))
-      ->capture_default_str();
-  app.add_option("--firmware", args.firmware,
-                 "Firmware image to run, ELF or Intel HEX; default: ours for as many lights");
-  app.add_flag("--opening-resets", args.opening_resets,
-               "Opening the port resets the board for 1 s, as it does an Arduino Uno");
-  app.add_option("--events", args.events, "Write what the lights do to this file, as JSON lines");
+  LightLog log((*board)->LightCount(), args.camera.rise);
+  RigLoop loop(**board, *port,
+               {.names = *names,
+                .opening_resets = args.opening_resets,
+                .events = events,
+                .light_log = &log});
+  return RunRig(args, firmware, loop, log, *environment);
 }
 
 }  // namespace
+}  // namespace sateen
 
 int main(int argc, char** argv) {
-  CLI::App app(
-      "An LED board without hardware: the controller's own firmware in a simulated ATmega328P, in "
-      "real time,\nwith its serial line on a pseudo terminal.",
-      "sateen-virtual-rig");
-  Args args;
-  AddOptions(app, args);
-  app.add_option("--port-link", args.port_link,
-                 "Make this path a link to the pseudo terminal while the board is plugged in");
-  CLI::App* run = app.add_subcommand(
-      "run", "Start the rig, run a command that finds it as /dev/ttyACM0, and end with its status");
-  AddOptions(*run, args);
-  run->add_option("command", args.command, "The command and its arguments, after --")
-      ->required()
-      ->option_text("-- COMMAND ARGUMENTS ...");
-  app.footer(
-      "Without a command it runs until Ctrl-C, prints what the lights do as JSON lines, and reads\n"
-      "  reset, unplug, plug, brown-out [MS], flash [MS], quit\n"
-      "from standard input, a line each. The first event holds the environment in which another "
-      "shell\n"
-      "starts programs that find the board. Or start both at once:\n"
-      "  sateen-virtual-rig run --rig samples/rigs/ring10.json -- sateen light 3 --level 50%\n"
-      "Exit status: as that of sateen; with `run` that of the command.");
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 2;
+  sateen::RigArgs args;
+  if (const std::optional<int> status = sateen::ParseRigArgs(argc, argv, args)) {
+    return *status;
   }
   sateen::InstallInterruptHandlers();
-  const Result<int> status = Run(args);
+  const sateen::Result<int> status = sateen::Run(args);
   if (!status) {
-    std::cerr << "sateen-virtual-rig: error: " << status.error().message << '\n';
-    return ExitStatus(status.error());
+    sateen::Complain(status.error());
+    return sateen::ExitStatus(status.error());
   }
   return *status;
 }

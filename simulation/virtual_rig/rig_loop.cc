@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
-#include <sstream>
 #include <utility>
 
 namespace sateen {
@@ -33,6 +32,9 @@ RigLoop::RigLoop(VirtualBoard& board, VirtualPort& port, RigLoopOptions options)
   watch_ = board_.Watch(
       {.light =
            [this](const LightChange& change) {
+             if (options_.light_log != nullptr) {
+               options_.light_log->Changed(WallClockAt(change.time), change.light, change.level);
+             }
              const std::string& name = options_.names[static_cast<size_t>(change.light)];
              Say(change.time,
                  fmt::format(R"("event":"light","channel":{},"name":{},"level":{:.4g})",
@@ -68,53 +70,74 @@ void RigLoop::Step() {
     flash_ends_.reset();
     board_.FlashSync(false);
   }
-  if (const nanoseconds lag = WallTime() - board_.Now(); lag > kLongestLag) {
+  const nanoseconds lag = WallTime() - board_.Now();
+  longest_lag_ = std::max(longest_lag_, lag);
+  if (lag > kLongestLag) {
     left_out_ += lag;
   }
   board_.RunUntil(WallTime());
+  if (options_.light_log != nullptr) {
+    options_.light_log->KnownUntil(WallClockAt(board_.Now()));
+  }
   port_.Send(board_.TakeSent(), board_.InnerChip().BaudRate());
 }
 
 void RigLoop::End() {
   const double wall_s = duration<double>(steady_clock::now() - start_).count();
-  Say(board_.Now(), fmt::format(R"("event":"end","wall_s":{:.6f})", wall_s));
+  Say(board_.Now(), fmt::format(R"("event":"end","wall_s":{:.6f},"longest_lag_s":{:.6f})", wall_s,
+                                duration<double>(longest_lag_).count()));
 }
 
-Status RigLoop::Command(const std::string& line) {
-  std::istringstream words(line);
-  std::string verb;
-  double ms = 20;
-  words >> verb >> ms;
-  const auto time = std::chrono::duration_cast<SimTime>(duration<double, std::milli>(ms));
-  if (verb == "unplug") {
-    port_.Unplug();
-    board_.Unplug();
-    Say(board_.Now(), R"("event":"unplug")");
-  } else if (verb == "plug") {
+std::optional<Result<RigAction>> RigLoop::Parse(const std::string& line) {
+  const std::vector<std::string> words = WordsOf(line);
+  const std::string verb = words.empty() ? "" : words.front();
+  const bool takes_time = verb == "brown-out" || verb == "flash";
+  if (!takes_time && verb != "unplug" && verb != "plug" && verb != "reset") {
+    return std::nullopt;
+  }
+  if (const Status count = CheckWordCount(words, 1, takes_time ? 2 : 1, kBoardCommands); !count) {
+    return tl::unexpected(count.error());
+  }
+  const Result<double> ms =
+      words.size() > 1 ? NumberIn(words[1], "the time in ms", 0.0, 1e6) : Result<double>(20.0);
+  if (!ms) {
+    return tl::unexpected(ms.error());
+  }
+  if (verb == "flash" && !board_.HasFlashSync()) {
+    return Fail(ErrorCode::kInvalidArgument, "a board with {} lights has no flash sync",
+                board_.LightCount());
+  }
+  const auto time = std::chrono::duration_cast<SimTime>(duration<double, std::milli>(*ms));
+  return RigAction{[this, verb, time] { return Act(verb, time); }, /*on_board=*/true};
+}
+
+Status RigLoop::Act(const std::string& verb, SimTime time) {
+  if (verb == "plug") {
     board_.Plug();
     if (Status plugged = port_.Plug(); !plugged) {
       return plugged;
     }
     Say(board_.Now(), fmt::format(R"("event":"plug","terminal":{})", Quoted(port_.Terminal())));
+  } else if (verb == "unplug") {
+    port_.Unplug();
+    board_.Unplug();
+    Say(board_.Now(), R"("event":"unplug")");
   } else if (verb == "reset") {
     board_.Reset();
   } else if (verb == "brown-out") {
     board_.BrownOut(time);
-  } else if (verb == "flash") {
-    if (!board_.HasFlashSync()) {
-      return Fail(ErrorCode::kInvalidArgument, "a board with {} lights has no flash sync",
-                  board_.LightCount());
-    }
+  } else {
     board_.FlashSync(true);
     flash_ends_ = board_.Now() + time;
-  } else {
-    return Fail(ErrorCode::kInvalidArgument,
-                "'{}' is no command; need reset, unplug, plug, brown-out [MS] or flash [MS]", line);
   }
   return {};
 }
 
 nanoseconds RigLoop::WallTime() const { return steady_clock::now() - start_ - left_out_; }
+
+steady_clock::time_point RigLoop::WallClockAt(SimTime time) const {
+  return start_ + left_out_ + time;
+}
 
 void RigLoop::Say(SimTime time, const std::string& fields) const {
   if (options_.events != nullptr) {

@@ -5,9 +5,12 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "core/error.h"
+#include "simulation/virtual_rig/light_log.h"
+#include "simulation/virtual_rig/rig_action.h"
 #include "simulation/virtual_rig/virtual_board.h"
 #include "simulation/virtual_rig/virtual_port.h"
 
@@ -20,16 +23,23 @@ struct RigLoopOptions {
   bool opening_resets = false;
   // Where events go, one JSON object a line; nowhere if null.
   std::FILE* events = nullptr;
+  // Told by the wall clock what the lights do, where there is one.
+  LightLog* light_log = nullptr;
 };
+
+// What RigLoop::Parse() understands, for people.
+inline constexpr std::string_view kBoardCommands =
+    "reset, unplug, plug, brown-out [MS], flash [MS]";
 
 // Runs the virtual board in real time with its serial line on a virtual port, and writes down what
 // happens to its lights. Simulated time follows the wall clock at 1.00x: the board runs up to now,
 // what it sent goes to the host, and the loop waits until the host sends something or 100 us have
 // passed. When the machine keeps it from running for longer than 100 ms, that time is left out.
 //
-// Events, each with "time_s", simulated: "start" {port, terminal, firmware, lights,
-// environment}, "light"
-// {channel, name, level}, "shutter" {closed}, "reset" {cause}, "plug", "unplug", "end" {wall_s}.
+// Events, each with "time_s", simulated: "start" {port, terminal, firmware, lights, environment},
+// "light" {channel, name, level}, "shutter" {closed}, "reset" {cause}, "plug", "unplug", "end"
+// {wall_s, longest_lag_s}; of a camera "exposure" {number, exposure_s, f_number, iso, lit, bytes}
+// and "scene" {folder, read}.
 class RigLoop {
  public:
   RigLoop(VirtualBoard& board, VirtualPort& port, RigLoopOptions options);
@@ -45,12 +55,19 @@ class RigLoop {
   void Step();
   void End();
 
-  // "reset", "unplug", "plug", "brown-out [MS]" or "flash [MS]" (the camera closes its contact).
-  // kInvalidArgument for any other line.
-  Status Command(const std::string& line);
+  // A line of kBoardCommands; "flash" is the camera that closes its contact. Nothing where the verb
+  // is none of these; kInvalidArgument for what does not fit it. By the thread that calls Step(), as
+  // the action.
+  [[nodiscard]] std::optional<Result<RigAction>> Parse(const std::string& line);
+
+  // Writes down an event of now, the fields of its object without braces. By the same thread.
+  void Say(const std::string& fields) const { Say(board_.Now(), fields); }
 
  private:
   [[nodiscard]] std::chrono::nanoseconds WallTime() const;
+  // When it is, or was, `time` by the wall clock; of times since the machine last kept it from running.
+  [[nodiscard]] std::chrono::steady_clock::time_point WallClockAt(SimTime time) const;
+  Status Act(const std::string& verb, SimTime time);
   void Say(SimTime time, const std::string& fields) const;
 
   VirtualBoard& board_;
@@ -59,6 +76,7 @@ class RigLoop {
   int watch_ = 0;
   std::chrono::steady_clock::time_point start_;
   std::chrono::nanoseconds left_out_{};
+  std::chrono::nanoseconds longest_lag_{};
   std::optional<SimTime> flash_ends_;
   bool was_in_use_ = false;
 };

@@ -101,6 +101,7 @@ void VirtualCamera::OnEvent(EventSink sink) {
 VirtualCamera::Answer VirtualCamera::Handle(uint16_t operation,
                                             const std::vector<uint32_t>& parameters,
                                             std::string_view data, uint32_t transaction) {
+  TellAsked(operation);
   const std::lock_guard lock(mutex_);
   if (asleep_) {
     return {.silent = true};
@@ -133,6 +134,24 @@ VirtualCamera::Answer VirtualCamera::Handle(uint16_t operation,
     default:
       return Files(operation, parameters);
   }
+}
+
+void VirtualCamera::TellAsked(uint16_t operation) {
+  const bool capture = operation == ptp::kInitiateCapture ||
+                       operation == ptp::kNikonCaptureToMemory ||
+                       operation == ptp::kNikonCaptureToMedia;
+  if (!capture || !options_.asked) {
+    return;
+  }
+  int number = 0;
+  {
+    const std::lock_guard lock(mutex_);
+    if (asleep_ || exposing_) {
+      return;
+    }
+    number = report_.captures + 1;
+  }
+  options_.asked(number);
 }
 
 VirtualCamera::Answer VirtualCamera::Files(uint16_t operation,

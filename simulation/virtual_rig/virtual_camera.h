@@ -58,6 +58,9 @@ struct VirtualCameraOptions {
   std::string persona = "generic";  // or "nikon"
   FrameSource source;
   std::chrono::milliseconds late{1000};
+  // Told when a capture is asked for, before anything comes of it, with the number that its frame
+  // would have. From a thread of the camera; may Inject().
+  std::function<void(int number)> asked = {};
 };
 
 // What the camera has lived through.
@@ -116,6 +119,7 @@ class VirtualCamera {
   Answer Files(uint16_t operation, const std::vector<uint32_t>& parameters);
   Answer Transfer(Object& object, uint64_t offset, uint64_t longest);
   Answer Properties(uint16_t operation, uint32_t code, std::string_view data);
+  void TellAsked(uint16_t operation);
   Answer InitiateCapture(uint32_t transaction);
   Answer TakeEvents();
   void Expose(FrameRequest request, CameraFault fault, uint32_t transaction);

@@ -1,61 +1,18 @@
-#include <fcntl.h>
 #include <gmock/gmock.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
-#include <array>
-#include <chrono>
-#include <cstdio>
-#include <fstream>
-#include <nlohmann/json.hpp>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include "tests/testing/files.h"
+#include "tests/virtual_rig/running_rig.h"
 
 // The programs as people start them: sateen-virtual-rig with the firmware, and under it sateen with
 // libserialport. These run in real time; nothing here depends on how fast the machine is.
 namespace sateen::testing {
 namespace {
 
-using nlohmann::json;
 using ::testing::HasSubstr;
 using ::testing::Not;
-
-const std::string kRig = SATEEN_PROGRAM_DIR "/sateen-virtual-rig";
-const std::string kSateen = SATEEN_PROGRAM_DIR "/sateen";
-const std::string kRing = SATEEN_SOURCE_DIR "/samples/rigs/ring10.json";
-
-struct ShellResult {
-  int exit_status = -1;
-  std::string out;  // and what went to standard error
-};
-
-std::FILE* StartShell(const std::string& command) {
-  return popen(("exec 2>&1; " + command).c_str(), "r");
-}
-
-// Reads to the end, so that the command does not find its pipe closed.
-ShellResult EndShell(std::FILE* pipe) {
-  ShellResult result;
-  std::array<char, 4096> bytes = {};
-  for (size_t count = 0; (count = std::fread(bytes.data(), 1, bytes.size(), pipe)) > 0;) {
-    result.out.append(bytes.data(), count);
-  }
-  const int status = pclose(pipe);
-  result.exit_status = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
-  return result;
-}
-
-std::vector<json> Events(const std::filesystem::path& path) {
-  std::ifstream file(path);
-  std::vector<json> events;
-  for (std::string line; std::getline(file, line) && !file.eof();) {
-    events.push_back(json::parse(line));
-  }
-  return events;
-}
 
 // The changes of the lights, as "led-3 0.5".
 std::vector<std::string> LightEvents(const std::filesystem::path& path) {
@@ -67,8 +24,6 @@ std::vector<std::string> LightEvents(const std::filesystem::path& path) {
   }
   return lights;
 }
-
-ShellResult Shell(const std::string& command) { return EndShell(StartShell(command)); }
 
 TEST(RigProgram, SateenFindsTheVirtualBoardByItsUsbId) {
   const ShellResult result = Shell(kRig + " run -- " + kSateen + " devices --json");
@@ -140,56 +95,6 @@ TEST(RigProgram, SaysWhatIsWrongWithItsInputs) {
 
   EXPECT_EQ(Shell(kRig + " --no-such-option").exit_status, 2);
 }
-
-// A rig that runs by itself, told what to do by lines on its standard input.
-class RunningRig {
- public:
-  explicit RunningRig(const std::filesystem::path& folder) : events_(folder / "events.jsonl") {
-    const std::string command = "exec '" + kRig + "' --rig '" + kRing + "' --events '" +
-                                events_.string() + "' --port-link '" + (folder / "port").string() +
-                                "' 2>'" + (folder / "log").string() + "'";
-    input_ = popen(command.c_str(), "w");
-    start_ = WaitFor("start");
-  }
-  RunningRig(const RunningRig&) = delete;
-  RunningRig& operator=(const RunningRig&) = delete;
-  ~RunningRig() {
-    Tell("quit");
-    EXPECT_EQ(pclose(input_), 0);
-  }
-
-  void Tell(const std::string& line) {
-    std::fputs((line + "\n").c_str(), input_);
-    std::fflush(input_);
-  }
-
-  // The `number`th such event; waits for it, but not for ever.
-  json WaitFor(const std::string& what, int number = 1) {
-    for (int i = 0; i < 3000; ++i) {
-      int seen = 0;
-      for (const json& event : Events(events_)) {
-        if (event["event"] == what && ++seen == number) {
-          return event;
-        }
-      }
-      std::this_thread::sleep_for(std::chrono::milliseconds(20));
-    }
-    ADD_FAILURE() << "no event '" << what << "'";
-    return {};
-  }
-
-  // Before a command that shall find the board.
-  [[nodiscard]] std::string Environment() const {
-    return "LD_PRELOAD='" + start_["environment"]["LD_PRELOAD"].get<std::string>() +
-           "' SATEEN_VIRTUAL_PORT='" +
-           start_["environment"]["SATEEN_VIRTUAL_PORT"].get<std::string>() + "' ";
-  }
-
- private:
-  std::filesystem::path events_;
-  std::FILE* input_ = nullptr;
-  json start_;
-};
 
 TEST(RigProgram, UnpluggingEndsALightAndTheBoardIsFoundAgain) {
   const TempFolder folder;
