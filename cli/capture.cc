@@ -158,7 +158,6 @@ int RunCaptureWith(const CaptureArgs& args, RigDevices& devices, const Task& tas
   if (args.dry_run) {
     return DryRun(args, *request, devices, out, log);
   }
-  const auto start = std::chrono::steady_clock::now();
   const Result<CaptureSummary> summary = RunCapture(*request, devices, task, ShowOn(task));
   task.ClearProgress();
   if (!summary) {
@@ -168,10 +167,8 @@ int RunCaptureWith(const CaptureArgs& args, RigDevices& devices, const Task& tas
   if (!rig) {
     return Report(rig.error(), log);
   }
-  const double seconds =
-      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  out << (args.json ? CaptureJson(request->output, *rig, *summary, seconds)
-                    : CaptureText(request->output, *rig, *summary, seconds));
+  out << (args.json ? CaptureJson(request->output, *rig, *summary)
+                    : CaptureText(request->output, *rig, *summary));
   return 0;
 }
 

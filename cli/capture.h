@@ -35,9 +35,9 @@ int RunCaptureWith(const CaptureArgs& args, RigDevices& devices, const Task& tas
 
 // What a capture and a dry run report, as text and as JSON (docs/formats.md).
 [[nodiscard]] std::string CaptureText(const std::filesystem::path& session, const Rig& rig,
-                                      const CaptureSummary& summary, double seconds);
+                                      const CaptureSummary& summary);
 [[nodiscard]] std::string CaptureJson(const std::filesystem::path& session, const Rig& rig,
-                                      const CaptureSummary& summary, double seconds);
+                                      const CaptureSummary& summary);
 [[nodiscard]] std::string ForecastText(const CaptureForecast& forecast);
 [[nodiscard]] std::string ForecastJson(const CaptureForecast& forecast);
 

@@ -32,11 +32,11 @@ double Megabytes(std::uintmax_t bytes) { return static_cast<double>(bytes) / 1e6
 }  // namespace
 
 std::string CaptureText(const std::filesystem::path& session, const Rig& rig,
-                        const CaptureSummary& summary, double seconds) {
+                        const CaptureSummary& summary) {
   const std::vector<SessionFrame>& frames = summary.session.frames;
   const CaptureCheck& check = summary.check;
   std::string text = fmt::format("{}: {} frames, {} taken in {:.1f} s", session.string(),
-                                 frames.size(), summary.taken, seconds);
+                                 frames.size(), summary.taken, summary.seconds);
   if (summary.kept > 0) {
     text += fmt::format(", {} kept from before", summary.kept);
   }
@@ -63,7 +63,7 @@ std::string CaptureText(const std::filesystem::path& session, const Rig& rig,
 }
 
 std::string CaptureJson(const std::filesystem::path& session, const Rig& rig,
-                        const CaptureSummary& summary, double seconds) {
+                        const CaptureSummary& summary) {
   const CaptureCheck& check = summary.check;
   nlohmann::ordered_json json = {{"schema", "sateen.capture/1"},
                                  {"session", session.string()},
@@ -85,7 +85,8 @@ std::string CaptureJson(const std::filesystem::path& session, const Rig& rig,
     json["shift_px"] = {check.shift->px.x(), check.shift->px.y()};
   }
   json["notes"] = check.notes;
-  json["seconds"] = seconds;
+  json["seconds"] = summary.seconds;
+  json["camera_seconds"] = summary.camera_seconds;
   return json.dump(2) + "\n";
 }
 

@@ -50,8 +50,8 @@ int Run(int argc, char** argv) {
   sateen::cli::AddLight(app, light);
   sateen::cli::DevicesArgs devices;
   sateen::cli::AddDevices(app, devices);
-  sateen::cli::SessionVerifyArgs session_verify;
-  sateen::cli::AddSession(app, session_verify);
+  sateen::cli::SessionArgs session;
+  sateen::cli::AddSession(app, session);
   CLI::App* bench = app.add_subcommand("bench", "Measure speed against error on this machine");
   bench->require_subcommand(1);
   sateen::cli::BenchSolveArgs bench_solve;
@@ -90,7 +90,7 @@ int Run(int argc, char** argv) {
   } else if (app.got_subcommand("devices")) {
     status = RunDevices(devices, task, std::cout, std::cerr);
   } else if (app.got_subcommand("session")) {
-    status = RunSessionVerify(session_verify, task, std::cout, std::cerr);
+    status = RunSession(app, session, task, std::cout, std::cerr);
   } else if (bench->got_subcommand("simulate")) {
     status = RunBenchSimulate(bench_simulate, task, std::cout, std::cerr);
   } else if (bench->got_subcommand("calibrate")) {

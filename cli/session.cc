@@ -7,15 +7,23 @@
 
 namespace sateen::cli {
 
-void AddSession(CLI::App& root, SessionVerifyArgs& args) {
+void AddSession(CLI::App& root, SessionArgs& args) {
   CLI::App* session = root.add_subcommand("session", "Look after sessions on disk");
   session->require_subcommand(1);
   CLI::App* verify = session->add_subcommand(
       "verify",
       "Prove a session whole: its record, its journal and its rig agree, every light has its frame "
       "and every file its hash; exit status 3 where not");
-  verify->add_option("session", args.session, "Folder of the session")->required();
-  verify->add_flag("--json", args.json, "Print JSON");
+  verify->add_option("session", args.verify.session, "Folder of the session")->required();
+  verify->add_flag("--json", args.verify.json, "Print JSON");
+  AddSessionOverview(*session, args.overview);
+}
+
+int RunSession(const CLI::App& root, const SessionArgs& args, const Task& task, std::ostream& out,
+               std::ostream& log) {
+  return root.get_subcommand("session")->got_subcommand("verify")
+             ? RunSessionVerify(args.verify, task, out, log)
+             : RunSessionOverview(args.overview, task, out, log);
 }
 
 int RunSessionVerify(const SessionVerifyArgs& args, const Task& task, std::ostream& out,

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <iosfwd>
 
+#include "cli/session_overview.h"
 #include "core/task.h"
 
 namespace sateen::cli {
@@ -14,9 +15,16 @@ struct SessionVerifyArgs {
   bool json = false;
 };
 
-void AddSession(CLI::App& root, SessionVerifyArgs& args);
+struct SessionArgs {
+  SessionVerifyArgs verify;
+  SessionOverviewArgs overview;
+};
 
-// Returns the exit status.
+void AddSession(CLI::App& root, SessionArgs& args);
+
+// Runs the subcommand of `sateen session` that was typed. Returns the exit status.
+int RunSession(const CLI::App& root, const SessionArgs& args, const Task& task, std::ostream& out,
+               std::ostream& log);
 int RunSessionVerify(const SessionVerifyArgs& args, const Task& task, std::ostream& out,
                      std::ostream& log);
 

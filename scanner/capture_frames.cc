@@ -126,13 +126,13 @@ Result<std::vector<double>> CaptureSession::Meter(std::size_t light, Tools& tool
   for (int test = 0; search && !search->Found(); ++test) {
     Tell(tools, "metering", lit.name, search->TestTime());
     const Result<ExposureSettings> set = Configure(search->TestTime(), tools.camera);
-    const Result<CapturedFile> file =
+    const Result<LitFrame> shot =
         set ? ExposeLit(tools.board, tools.camera, {&lit, journal_.begun.level, set->exposure_s},
                         options_, dir_ / kIncoming, tools.task)
             : tl::unexpected(set.error());
     const Result<SignalLevels> levels =
-        file ? ReadSignalLevels({.path = file->path, .response = rig_.response})
-             : tl::unexpected(file.error());
+        shot ? ReadSignalLevels({.path = shot->file.path, .response = rig_.response})
+             : tl::unexpected(shot.error());
     Status taken = levels ? search->Take(*levels) : tl::unexpected(levels.error());
     if (taken && test == kMostTests) {
       taken =
@@ -144,7 +144,7 @@ Result<std::vector<double>> CaptureSession::Meter(std::size_t light, Tools& tool
     }
     peak_ = levels->peak;
     std::error_code ignored;
-    fs::remove(file->path, ignored);
+    fs::remove(shot->file.path, ignored);
   }
   return search.map([](const ExposureSearch& found) { return found.Exposures(); });
 }
@@ -161,17 +161,19 @@ Result<CaptureSession::Arrived> CaptureSession::Shoot(std::size_t frame, int att
   if (!set) {
     return tl::unexpected(set.error());
   }
-  const Result<CapturedFile> file =
+  const Result<LitFrame> shot =
       ExposeLit(tools.board, tools.camera, {LightOf(frame), journal_.begun.level, set->exposure_s},
                 options_, folder, tools.task);
-  if (!file) {
-    return tl::unexpected(file.error());
+  if (!shot) {
+    return tl::unexpected(shot.error());
   }
-  Arrived arrived{.frame = frame, .record = planned, .path = file->path};
+  camera_time_ += shot->camera_time;
+  const fs::path path = shot->file.path;
+  Arrived arrived{.frame = frame, .record = planned, .path = path};
   arrived.record.exposure_s = set->exposure_s;
   arrived.record.f_number = set->f_number;
   arrived.record.iso = set->iso;
-  arrived.record.file = FileNameOf(frame, planned, file->path);
+  arrived.record.file = FileNameOf(frame, planned, path);
   FrameCheckOptions checks = options_.checks;
   if (!IsBase(frame) || !journal_.begun.exposure_s) {
     // What a longer exposure loses, the shorter one has; and what was found is found again.
@@ -180,7 +182,7 @@ Result<CaptureSession::Arrived> CaptureSession::Shoot(std::size_t frame, int att
   arrived.looked = std::async(
       std::launch::async,
       [this, checks, settings = *set, role = planned.role, place = dir_ / arrived.record.file,
-       of = FrameFile{file->path, arrived.record.Exposure(), std::nullopt, rig_.response}] {
+       of = FrameFile{path, arrived.record.Exposure(), std::nullopt, rig_.response}] {
         Result<Looked> looked =
             CheckFrame(of, rig_, settings, role, checks).and_then([&](FrameLook look) {
               return ReadSignalLevels(of).map([&](SignalLevels levels) {

@@ -312,6 +312,9 @@ Result<CaptureSummary> CaptureSession::Complete(CaptureCheck check) {
   }
   CaptureSummary summary{.check = std::move(check), .taken = taken_, .rejected = rejected_};
   summary.kept = static_cast<int>(journal_.done.size()) - taken_;
+  const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - started_;
+  summary.seconds = spent.count();
+  summary.camera_seconds = camera_time_.count();
   if (status) {
     summary.session = SessionOf(journal_);
     status = WriteFileWhole(dir_ / kRecordFile, SessionToJson(summary.session));
@@ -353,7 +356,6 @@ Status CaptureSession::TakeAll(Tools& tools) {
 Result<CaptureSummary> CaptureSession::Run(LightBoard& board, TetheredCamera& camera,
                                            const Task& task, const CaptureObserver& observer) {
   Tools tools{board, camera, task, observer};
-  started_ = std::chrono::steady_clock::now();
   if (const Status verified = VerifyDone(); !verified) {
     return tl::unexpected(verified.error());
   }

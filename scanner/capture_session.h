@@ -39,9 +39,11 @@ using CaptureObserver = std::function<void(const CaptureEvent&)>;
 struct CaptureSummary {
   Session session;
   CaptureCheck check;
-  int taken = 0;     // frames, in this run
-  int kept = 0;      // frames of earlier runs
-  int rejected = 0;  // frames of this run that did not count
+  int taken = 0;                // frames, in this run
+  int kept = 0;                 // frames of earlier runs
+  int rejected = 0;             // frames of this run that did not count
+  double seconds = 0.0;         // this run
+  double camera_seconds = 0.0;  // of that, the camera exposed and delivered frames that arrived
 };
 
 // The dark, every light of the rig in its order at each exposure, the first light again at the first
@@ -150,7 +152,8 @@ class CaptureSession {
   std::vector<std::optional<FrameLook>> looks_;  // of done frames
   std::optional<std::size_t> brighter_;          // light that the exposures found are too long for
   double peak_ = 0.0;
-  std::chrono::steady_clock::time_point started_;
+  std::chrono::steady_clock::time_point started_ = std::chrono::steady_clock::now();
+  std::chrono::duration<double> camera_time_{};
   int taken_ = 0;
   int rejected_ = 0;
 };

@@ -139,9 +139,9 @@ Status ConfirmAndTurnOff(LightBoard& board, const LitExposure& exposure) {
 
 }  // namespace
 
-Result<CapturedFile> ExposeLit(LightBoard& board, TetheredCamera& camera,
-                               const LitExposure& exposure, const CaptureOptions& options,
-                               const std::filesystem::path& folder, const Task& task) {
+Result<LitFrame> ExposeLit(LightBoard& board, TetheredCamera& camera, const LitExposure& exposure,
+                           const CaptureOptions& options, const std::filesystem::path& folder,
+                           const Task& task) {
   if (board.state() != LightBoard::State::kReady) {
     if (const Status connected = board.Connect(); !connected) {
       return tl::unexpected(connected.error());
@@ -154,16 +154,18 @@ Result<CapturedFile> ExposeLit(LightBoard& board, TetheredCamera& camera,
   board.Wait(options.settle);
   KeepAlive keep_alive(board, options.keep_alive, task);
   const milliseconds shutter(static_cast<int>(std::ceil(1000.0 * exposure.exposure_s)));
+  const auto begin = std::chrono::steady_clock::now();
   Result<CapturedFile> file = camera.Capture(folder, shutter + options.deadline);
+  const std::chrono::duration<double> camera_time = std::chrono::steady_clock::now() - begin;
   const Status kept = keep_alive.Stop();
   if (task.Cancelled()) {
     return Fail(ErrorCode::kCancelled, "cancelled while the camera exposed; the lights are off");
   }
   if (!file) {
-    return file;
+    return tl::unexpected(file.error());
   }
   const Status confirmed = kept.and_then([&] { return ConfirmAndTurnOff(board, exposure); });
-  return confirmed ? file : tl::unexpected(confirmed.error());
+  return confirmed.map([&] { return LitFrame{*std::move(file), camera_time}; });
 }
 
 double LongestExposure(const BoardInfo& board, const Light& light, const CaptureOptions& options) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <filesystem>
 #include <string>
 
@@ -19,6 +20,11 @@ struct LitExposure {
   double exposure_s = 0.0;  // as the camera has it
 };
 
+struct LitFrame {
+  CapturedFile file;
+  std::chrono::duration<double> camera_time{};  // exposing and transferring
+};
+
 /// One exposure under one light:
 ///
 ///     1. the light goes on, for no longer than exposure and margin, and the board answers that it
@@ -33,10 +39,9 @@ struct LitExposure {
 /// cancelled task turns them off at once.
 ///
 /// Errors   kDevice, kTimeout: board or camera; kIo: the disk; kCancelled
-[[nodiscard]] Result<CapturedFile> ExposeLit(LightBoard& board, TetheredCamera& camera,
-                                             const LitExposure& exposure,
-                                             const CaptureOptions& options,
-                                             const std::filesystem::path& folder, const Task& task);
+[[nodiscard]] Result<LitFrame> ExposeLit(LightBoard& board, TetheredCamera& camera,
+                                         const LitExposure& exposure, const CaptureOptions& options,
+                                         const std::filesystem::path& folder, const Task& task);
 
 // Longest exposure for which the board lets a light be on, margin and all; s.
 [[nodiscard]] double LongestExposure(const BoardInfo& board, const Light& light,

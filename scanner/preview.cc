@@ -114,15 +114,15 @@ class PreviewShooter {
   Result<Shot> Take(double exposure_s, const std::filesystem::path& folder) {
     const Result<ExposureSettings> set = camera_.Configure(
         {.exposure_s = exposure_s, .f_number = request_.f_number, .iso = request_.iso});
-    const Result<CapturedFile> file =
+    const Result<LitFrame> lit =
         set ? ExposeLit(board_, camera_, {light_, request_.level, set->exposure_s}, {}, folder,
                         task_)
             : tl::unexpected(set.error());
-    Result<RawMosaic> mosaic = file ? ReadRawMosaic(file->path) : tl::unexpected(file.error());
+    Result<RawMosaic> mosaic = lit ? ReadRawMosaic(lit->file.path) : tl::unexpected(lit.error());
     if (!mosaic) {
       return tl::unexpected(mosaic.error());
     }
-    FrameFile of{.path = file->path, .response = response_};
+    FrameFile of{.path = lit->file.path, .response = response_};
     Result<SensorReading> reading = ReadingOf(of, *mosaic);
     if (!reading) {
       return tl::unexpected(reading.error());

@@ -16,7 +16,11 @@ using testing::TempFolder;
 RunResult Verify(const std::vector<std::string>& words) {
   std::vector<std::string> all = {"session", "verify"};
   all.insert(all.end(), words.begin(), words.end());
-  return testing::RunCommand<cli::SessionVerifyArgs>(all, cli::AddSession, cli::RunSessionVerify);
+  return testing::RunCommand<cli::SessionArgs>(
+      all, cli::AddSession,
+      [](const cli::SessionArgs& args, const Task& task, std::ostream& out, std::ostream& log) {
+        return cli::RunSessionVerify(args.verify, task, out, log);
+      });
 }
 
 // A session with the hashes of its frames.

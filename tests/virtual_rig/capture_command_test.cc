@@ -150,7 +150,7 @@ TEST_F(CaptureCommand, PreviewShowsOneLight) {
 
 // What saturates is magenta.
 TEST_F(CaptureCommand, PreviewMarksWhatSaturates) {
-  PreviewArgs args{.output = temp_.Path() / "look.jpg", .light = "0", .exposure = "2s"};
+  PreviewArgs args{.output = temp_.Path() / "look.jpg", .light = "0", .exposure = "1s"};
   ASSERT_EQ(RunPreviewWith(args, *devices_, {}, out_, log_), 0) << log_.str();
   const Result<Photo> photo = ReadPhoto(args.output);
   ASSERT_TRUE(photo) << photo.error().message;

@@ -1,0 +1,171 @@
+#include "cli/session_overview.h"
+
+#include <algorithm>
+#include <ostream>
+#include <vector>
+
+#include "cli/canvas.h"
+#include "cli/pictures.h"
+#include "cli/quantity.h"
+#include "core/output_folder.h"
+#include "imaging/image_io.h"
+#include "imaging/raw.h"
+#include "rig/rig.h"
+#include "scanner/session.h"
+
+namespace sateen::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr int kPanelPx = 320;
+constexpr int kColumns = 5;
+constexpr double kHeatTop = 0.99;  // of the values; above is white
+
+std::string CaptionOf(const SessionFrame& frame) {
+  std::string caption = frame.role == FrameRole::kDark ? "dark" : frame.light;
+  if (frame.role == FrameRole::kRepeat) {
+    caption += " again";
+  }
+  return frame.exposure_s ? caption + ", " + ExposureText(*frame.exposure_s) : caption;
+}
+
+// Means of factor x factor pixels, so that it is at most kPanelPx wide.
+Image3 SmallOf(const Image3& image) {
+  const int factor = (image[0].width + kPanelPx - 1) / kPanelPx;
+  Image3 small({image[0].width / factor, std::max(1, image[0].height / factor)});
+  const float share = 1.0F / static_cast<float>(factor * factor);
+  for (size_t c = 0; c < 3; ++c) {
+    for (int y = 0; y < small[c].height * factor && y < image[c].height; ++y) {
+      for (int x = 0; x < small[c].width * factor; ++x) {
+        small[c].At(x / factor, y / factor) += share * image[c].At(x, y);
+      }
+    }
+  }
+  return small;
+}
+
+Result<Image3> ReadSmallFrame(const fs::path& path, const std::optional<Response>& response) {
+  if (!IsRawName(path)) {
+    return ReadPhoto(path).map([](const Photo& photo) { return SmallOf(photo.rgb); });
+  }
+  return ReadRawMosaic(path).map([&](const RawMosaic& mosaic) {
+    std::array<float, 3> balance = mosaic.camera_white_balance;
+    for (size_t c = 0; c < 3 && response; ++c) {
+      balance[c] = static_cast<float>(response->white_balance[static_cast<Eigen::Index>(c)]);
+    }
+    return SmallOf(Demosaic(mosaic, balance));
+  });
+}
+
+// Every frame as bright as it is, 1 being the white of the brightest one.
+Result<std::vector<Rgb8>> FramePanels(const fs::path& dir, const Session& session,
+                                      const std::optional<Response>& response, const Task& task) {
+  std::vector<Image3> frames;
+  float white = 0.0F;
+  task.BeginStage("reading", static_cast<int>(session.frames.size()));
+  for (const SessionFrame& frame : session.frames) {
+    Result<Image3> rgb =
+        task.CheckCancelled().and_then([&] { return ReadSmallFrame(dir / frame.file, response); });
+    if (!rgb) {
+      return tl::unexpected(rgb.error());
+    }
+    white = std::max(white, frame.role == FrameRole::kDark ? 0.0F : WhiteOf(*rgb));
+    frames.push_back(*std::move(rgb));
+    task.Advance();
+  }
+  std::vector<Rgb8> panels;
+  for (size_t k = 0; k < frames.size(); ++k) {
+    panels.push_back(
+        Captioned(ShowLinear(frames[k], std::max(white, 1e-6F)), CaptionOf(session.frames[k])));
+  }
+  return panels;
+}
+
+// An error or a residual as heat.
+Rgb8 HeatOf(const Image<float>& values) {
+  std::vector<float> sorted = values.pixels;
+  const auto place = sorted.begin() +
+                     static_cast<std::ptrdiff_t>(kHeatTop * static_cast<double>(sorted.size() - 1));
+  std::nth_element(sorted.begin(), place, sorted.end());
+  return ShowHeat(values, std::max(*place, 1e-6F), Image<uint8_t>(values.width, values.height, 1));
+}
+
+Result<std::vector<Rgb8>> MapPanels(const fs::path& maps) {
+  std::vector<Rgb8> panels;
+  const auto add = [&](const char* file, const char* caption, const auto& show) -> Status {
+    return ReadImage3(maps / file).map([&](const Image3& map) {
+      panels.push_back(Captioned(Shrunk(show(map), kPanelPx), caption));
+    });
+  };
+  Status status =
+      add("normal.exr", "normal", [](const Image3& map) { return ShowNormal(map); }).and_then([&] {
+        return add("albedo.exr", "albedo", [](const Image3& map) { return ShowLinear(map); });
+      });
+  for (const auto& [file, caption] :
+       {std::pair{"residual.exr", "residual"}, std::pair{"error.exr", "error from truth"}}) {
+    std::error_code ignored;
+    if (status && fs::exists(maps / file, ignored)) {
+      status = ReadPhoto(maps / file).map([&, caption = caption](const Photo& map) {
+        panels.push_back(Captioned(Shrunk(HeatOf(map.rgb[0]), kPanelPx), caption));
+      });
+    }
+  }
+  return status ? Result<std::vector<Rgb8>>(std::move(panels)) : tl::unexpected(status.error());
+}
+
+Status WriteOverview(const SessionOverviewArgs& args, const Task& task) {
+  const Result<Session> session = ReadSessionRecord(args.session);
+  const Result<Rig> rig =
+      session ? ReadRig(args.session / session->rig) : tl::unexpected(session.error());
+  Result<std::vector<Rgb8>> panels =
+      rig ? FramePanels(args.session, *session, rig->response, task) : tl::unexpected(rig.error());
+  if (panels && !args.maps.empty()) {
+    // Maps begin a row of their own.
+    while (panels->size() % kColumns != 0) {
+      Rgb8 empty = panels->back();
+      for (Image<uint8_t>& plane : empty) {
+        std::ranges::fill(plane.pixels, uint8_t{0});
+      }
+      panels->push_back(std::move(empty));
+    }
+    panels = MapPanels(args.maps).map([&](std::vector<Rgb8> maps) {
+      panels->insert(panels->end(), maps.begin(), maps.end());
+      return *std::move(panels);
+    });
+  }
+  if (!panels) {
+    return tl::unexpected(panels.error());
+  }
+  Result<OutputFolder> folder =
+      OutputFolder::Open(args.output.has_parent_path() ? args.output.parent_path() : fs::path("."));
+  if (!folder) {
+    return tl::unexpected(folder.error());
+  }
+  return WritePng8(folder->Stage(args.output.filename().string()), ContactSheet(*panels, kColumns))
+      .and_then([&] { return folder->Commit(); });
+}
+
+}  // namespace
+
+void AddSessionOverview(CLI::App& session, SessionOverviewArgs& args) {
+  CLI::App* cmd = session.add_subcommand(
+      "overview", "All frames of a session on one picture, and the maps of its solve");
+  cmd->add_option("session", args.session, "Folder of the session")->required();
+  cmd->add_option("--maps", args.maps, "Folder of maps that sateen solve has written");
+  cmd->add_option("-o,--output", args.output, "PNG file")->required();
+}
+
+int RunSessionOverview(const SessionOverviewArgs& args, const Task& task, std::ostream& out,
+                       std::ostream& log) {
+  const Status written = WriteOverview(args, task);
+  task.ClearProgress();
+  if (!written) {
+    log << "sateen session overview: error: " << written.error().message << '\n';
+    return ExitStatus(written.error());
+  }
+  out << args.output.string() << '\n';
+  return 0;
+}
+
+}  // namespace sateen::cli

@@ -1,0 +1,40 @@
+#!/usr/bin/env bash
+# The whole loop without hardware: white paper and a fabric are captured on the virtual rig (the LED
+# board's own firmware, real serial and camera libraries), the lights are calibrated by the paper, the
+# fabric is solved, and the maps are compared with the truth that only the simulator knows.
+# Usage: samples/capture.sh [FOLDER_OF_PROGRAMS [OUTPUT_FOLDER]]
+set -euo pipefail
+cd "$(dirname "$0")/.."
+bin=$(realpath "${1:-build/release/bin}")
+out=${2:-out/demo}
+rm -rf "$out/capture"
+mkdir -p "$out/capture"
+cp samples/rigs/ring10-rough.json "$out/capture/rig.json"
+cd "$out/capture"
+
+# What lies under the camera: how each light alone shows it, and the truth about it.
+for scene in white-flat twill-table; do
+  "$bin/sateen" simulate "$OLDPWD/samples/scenes/$scene.json" --linear -o "table/$scene" >/dev/null
+done
+
+# Says what it types. The virtual rig is the hardware: board, camera and what lies on the table.
+on_rig() {
+  local scene=$1
+  shift
+  echo "\$ $*"
+  "$bin/sateen-virtual-rig" run --scene "table/$scene" -- "$bin/$@"
+  echo
+}
+type_in() {
+  echo "\$ $*"
+  "$bin/$@"
+  echo
+}
+
+echo "-- white paper lies on the table; lights are known by the ruler, 15 mm off"
+on_rig white-flat sateen capture --rig rig.json -o scans/white --sheet
+type_in sateen calibrate lights --sheet scans/white -o rig.json
+echo "-- the fabric lies on the table"
+on_rig twill-table sateen capture --rig rig.json -o scans/twill
+type_in sateen session verify scans/twill
+type_in sateen solve scans/twill --truth table/twill-table -o maps/twill
