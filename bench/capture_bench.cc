@@ -373,7 +373,7 @@ int main(int argc, char** argv) {
   const fs::path source = SATEEN_SOURCE_DIR;
   CaptureBench bench(scratch.Path());
   if (!scratch.Create() ||
-      !bench.Render((source / "samples/scenes/twill-small.json").string(), "small")) {
+      !bench.Render((source / "samples/scenes/twill-table.json").string(), "small")) {
     std::cerr << "capture_bench: error: cannot render into " << scratch.Path() << '\n';
     return 4;
   }

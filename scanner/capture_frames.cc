@@ -107,14 +107,36 @@ Status CaptureSession::MakePlan(Tools& tools) {
   });
 }
 
+// How bright the light's frame is at this exposure. Board and camera are given as many tries as for a
+// frame that counts.
+Result<SignalLevels> CaptureSession::TakeTestFrame(const Light& light, double exposure_s,
+                                                   Tools& tools) {
+  for (int attempt = 1;; ++attempt) {
+    const Result<ExposureSettings> set = MakeEmptyFolder(dir_ / kIncoming).and_then([&] {
+      return Configure(exposure_s, tools.camera);
+    });
+    const Result<LitFrame> shot =
+        set ? ExposeLit(tools.board, tools.camera, {&light, journal_.begun.level, set->exposure_s},
+                        options_, dir_ / kIncoming, tools.task)
+            : tl::unexpected(set.error());
+    Result<SignalLevels> levels =
+        shot ? ReadSignalLevels({.path = shot->file.path, .response = rig_.response})
+             : tl::unexpected(shot.error());
+    if (levels || attempt == options_.tries || !MayBeTriedAgain(levels.error().code)) {
+      return levels;
+    }
+    if (const Status again = Reopen(levels.error(), tools.camera); !again) {
+      return tl::unexpected(again.error());
+    }
+  }
+}
+
 Result<std::vector<double>> CaptureSession::Meter(std::size_t light, Tools& tools) {
   const Light& lit = rig_.lights[light];
-  Status ready = MakeEmptyFolder(dir_ / kIncoming);
-  if (ready && tools.board.state() != LightBoard::State::kReady) {
-    ready = tools.board.Connect();
-  }
-  if (!ready) {
-    return tl::unexpected(ready.error());
+  if (tools.board.state() != LightBoard::State::kReady) {
+    if (const Status connected = tools.board.Connect(); !connected) {
+      return tl::unexpected(connected.error());
+    }
   }
   const bool is_sheet = journal_.begun.kind == SessionKind::kSheet;
   Result<ExposureSearch> search =
@@ -123,28 +145,18 @@ Result<std::vector<double>> CaptureSession::Meter(std::size_t light, Tools& tool
                              .low = DarkestUseful(rig_.response),
                              .most = is_sheet ? 1 : journal_.begun.brackets,
                              .longest_s = LongestExposure(tools.board.Info(), lit, options_)});
-  for (int test = 0; search && !search->Found(); ++test) {
+  for (int test = 1; search && !search->Found(); ++test) {
     Tell(tools, "metering", lit.name, search->TestTime());
-    const Result<ExposureSettings> set = Configure(search->TestTime(), tools.camera);
-    const Result<LitFrame> shot =
-        set ? ExposeLit(tools.board, tools.camera, {&lit, journal_.begun.level, set->exposure_s},
-                        options_, dir_ / kIncoming, tools.task)
-            : tl::unexpected(set.error());
-    const Result<SignalLevels> levels =
-        shot ? ReadSignalLevels({.path = shot->file.path, .response = rig_.response})
-             : tl::unexpected(shot.error());
+    const Result<SignalLevels> levels = TakeTestFrame(lit, search->TestTime(), tools);
     Status taken = levels ? search->Take(*levels) : tl::unexpected(levels.error());
-    if (taken && test == kMostTests) {
-      taken =
-          Fail(ErrorCode::kDevice, "no exposure found in {} test frames; give --exposure", test);
+    if (taken && !search->Found() && test == kMostTests) {
+      taken = Fail(ErrorCode::kDevice, "no exposure found in {} of them; give --exposure", test);
     }
     if (!taken) {
       return Fail(taken.error().code, "test frame of light '{}': {}", lit.name,
                   taken.error().message);
     }
     peak_ = levels->peak;
-    std::error_code ignored;
-    fs::remove(shot->file.path, ignored);
   }
   return search.map([](const ExposureSearch& found) { return found.Exposures(); });
 }
@@ -246,13 +258,18 @@ Status CaptureSession::TakeAgain(Error error, std::size_t frame, int attempt, To
   if (attempt == options_.tries) {
     return tl::unexpected(std::move(error));
   }
-  if (error.code == ErrorCode::kDevice || error.code == ErrorCode::kTimeout) {
-    configured_.reset();
-    if (const Result<CameraInfo> again = tools.camera.Open(); !again) {
-      return Fail(again.error().code, "{}; and then: {}", error.message, again.error().message);
-    }
+  return Reopen(error, tools.camera);
+}
+
+// After what may have been the camera's fault.
+Status CaptureSession::Reopen(const Error& error, TetheredCamera& camera) {
+  if (error.code != ErrorCode::kDevice && error.code != ErrorCode::kTimeout) {
+    return {};
   }
-  return {};
+  configured_.reset();
+  const Result<CameraInfo> again = camera.Open();
+  return again ? Status()
+               : Fail(again.error().code, "{}; and then: {}", error.message, again.error().message);
 }
 
 Status CaptureSession::TakeOpenFrames(Tools& tools) {

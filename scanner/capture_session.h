@@ -120,6 +120,9 @@ class CaptureSession {
   [[nodiscard]] Status VerifyDone();
   [[nodiscard]] Status MakePlan(Tools& tools);
   [[nodiscard]] Result<std::vector<double>> Meter(std::size_t light, Tools& tools);
+  [[nodiscard]] Result<SignalLevels> TakeTestFrame(const Light& light, double exposure_s,
+                                                   Tools& tools);
+  [[nodiscard]] Status Reopen(const Error& error, TetheredCamera& camera);
   [[nodiscard]] Status TakeAll(Tools& tools);
   [[nodiscard]] Status TakeOpenFrames(Tools& tools);
   [[nodiscard]] Result<Arrived> Shoot(std::size_t frame, int attempt, Tools& tools);

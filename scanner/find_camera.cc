@@ -75,14 +75,14 @@ std::string Obstacle(const fs::path& device, const fs::path& node, bool held) {
 
 }  // namespace
 
-Result<std::unique_ptr<TetheredCamera>> MakeTetheredCamera(const std::string& name) {
+Result<std::unique_ptr<TetheredCamera>> MakeTetheredCamera(const std::string& name, bool decode) {
   constexpr std::string_view kFolder = "folder:";
   if (name.starts_with(kFolder) && name.size() > kFolder.size()) {
     return std::make_unique<FolderCamera>(
         FolderCameraOptions{.folder = name.substr(kFolder.size())});
   }
   if (name.empty() || name.starts_with("usb:") || name.starts_with("ptpip:")) {
-    return std::make_unique<PtpCamera>(PtpCameraOptions{.port = name});
+    return std::make_unique<PtpCamera>(PtpCameraOptions{.port = name, .decode = decode});
   }
   return Fail(ErrorCode::kInvalidArgument,
               "'{}' is no camera; need usb:BUS,DEVICE or ptpip:ADDRESS, as sateen devices lists "

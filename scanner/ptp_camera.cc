@@ -127,7 +127,22 @@ Result<CameraInfo> PtpCamera::Connect() {
       return tl::unexpected(has.error());
     }
   }
-  return info_;
+  return ReadExposureTimes().map([this] { return info_; });
+}
+
+Status PtpCamera::ReadExposureTimes() {
+  const auto times = Find(profile_->exposure_time);
+  if (!times) {
+    return tl::unexpected(times.error());
+  }
+  exposure_times_.clear();
+  for (const std::string& word : *times ? (*times)->choices : std::vector<std::string>{}) {
+    if (const std::optional<double> time = SettingValue(word)) {
+      exposure_times_.push_back(*time);
+    }
+  }
+  std::ranges::sort(exposure_times_);
+  return {};
 }
 
 Result<json> PtpCamera::Ask(const json& request, milliseconds longest) {
@@ -273,17 +288,6 @@ Result<ExposureSettings> PtpCamera::Configure(const ExposureSettings& settings) 
   if (Status done = apply(profile_->exposure_time, now.exposure_s, "exposure [s]"); !done) {
     return tl::unexpected(done.error());
   }
-  const auto times = Find(profile_->exposure_time);
-  if (!times) {
-    return tl::unexpected(times.error());
-  }
-  exposure_times_.clear();
-  for (const std::string& word : *times ? (*times)->choices : std::vector<std::string>{}) {
-    if (const std::optional<double> time = SettingValue(word)) {
-      exposure_times_.push_back(*time);
-    }
-  }
-  std::ranges::sort(exposure_times_);
   set_ = now;
   return now;
 }

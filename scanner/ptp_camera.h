@@ -78,6 +78,7 @@ class PtpCamera : public TetheredCamera {
   Result<nlohmann::json> Ask(const nlohmann::json& request, std::chrono::milliseconds longest);
   Result<std::optional<Setting>> Find(const std::vector<std::string>& names);
   Status Require(const RequiredSetting& required);
+  Status ReadExposureTimes();
   Result<std::optional<double>> SetNumber(const std::vector<std::string>& names, double wanted,
                                           const char* what);
   Result<FileOnCamera> Expose(const Deadline& deadline);

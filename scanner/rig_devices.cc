@@ -28,7 +28,8 @@ Result<LightBoard*> RigDevices::Board() {
 
 Result<TetheredCamera*> RigDevices::Camera() {
   if (!camera_) {
-    Result<std::unique_ptr<TetheredCamera>> made = MakeTetheredCamera(names_.camera);
+    Result<std::unique_ptr<TetheredCamera>> made =
+        MakeTetheredCamera(names_.camera, /*decode=*/false);
     if (!made) {
       return tl::unexpected(made.error());
     }

@@ -43,7 +43,8 @@ void AddOptions(CLI::App& app, RigArgs& args) {
                  "Do this command, as from standard input, at the start; may be repeated")
       ->option_text("COMMAND ...")
       ->expected(1)
-      ->take_all();
+      ->take_all()
+      ->allow_extra_args(false);  // or it would take the -- before the command
   RigCameraOptions& camera = args.camera;
   app.add_option("--scene", camera.scene,
                  "A camera that sees this scene, lit by the board: a session that\n"
@@ -72,7 +73,8 @@ void AddOptions(CLI::App& app, RigArgs& args) {
                  "after that: '5:nudge 3 0', '5+12ms:unplug'; may be repeated")
       ->option_text("N[+TIME]:COMMAND ...")
       ->expected(1)
-      ->take_all();
+      ->take_all()
+      ->allow_extra_args(false);  // or it would take the -- before the command
 }
 
 // Options that say something about a camera that is not there.
