@@ -29,9 +29,9 @@ struct ExposedFrame {
   size_t bytes = 0;
 };
 
-// The virtual camera's view of a lit scene: each frame is lit by what the board's pins did while the
-// shutter was open. What can happen to a rig besides can be done to it. All calls may come from any
-// thread.
+// The virtual camera's view of a lit scene: each frame is lit by what the board's pins did while
+// the shutter was open. What can happen to a rig besides can be done to it. All calls may come from
+// any thread.
 class SceneCamera {
  public:
   // The exposure that Sensor::full_scale is of: H of 1/50 s, f/8, ISO 100.
