@@ -23,8 +23,8 @@ namespace sateen {
 // A frame as it was exposed, whatever a capture believes.
 struct ExposedFrame {
   FrameRequest request;
-  // Light by light, by what the pins did: the share of the exposure that it was on, times its level,
-  // as far as it had risen. Lights of share 0 are left out.
+  // Light by light, by what the pins did: the share of the exposure that it was on, times its
+  // level, as far as it had risen. Lights of share 0 are left out.
   std::map<std::string, double> shares;
   size_t bytes = 0;
 };

@@ -26,9 +26,12 @@ class RigLoopTest : public BoardTest {
     board_->Send(Encode(
         77, Wire<SateenSetLight>::kId,
         Wire<SateenSetLight>::Pack({.channel = channel, .level_permille = 1000, .on_ms = on_ms})));
-    while (board_->Level(channel) == 0) {
+    bool seen = false;  // it may be off again after one step of a busy machine
+    const int watch = board_->Watch({.light = [&seen](const LightChange&) { seen = true; }});
+    while (!seen) {
       loop_->Step();
     }
+    board_->Unwatch(watch);
   }
 
   LightLog log_;
