@@ -67,7 +67,9 @@ TEST_F(RigLoopTest, WhileTheLoopIsKeptFromRunningALightStaysAsItIs) {
     loop_->Step();
   }
   // Its 150 ms were not over then: that time did not pass for the board.
-  EXPECT_EQ(log_.MeanLevels(begin, end)->at(3), 1.0);
+  const auto means = log_.MeanLevels(begin, end);
+  ASSERT_TRUE(means) << means.error().message;
+  EXPECT_EQ(means->at(3), 1.0);
 }
 
 }  // namespace
