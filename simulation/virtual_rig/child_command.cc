@@ -23,7 +23,7 @@ std::vector<std::string> EnvironmentWith(const std::map<std::string, std::string
     }
   }
   for (const auto& [name, value] : more) {
-    all.push_back(name + "=" + value);
+    all.push_back(fmt::format("{}={}", name, value));
   }
   return all;
 }

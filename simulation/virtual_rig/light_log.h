@@ -10,9 +10,9 @@
 
 namespace sateen {
 
-/// What the lights of the board have done by the wall clock, for who asks later how bright they were
-/// while a shutter was open. One thread writes, any may ask. Of a light that is told the level u(t),
-/// the output r(t) follows with the time constant tau:
+/// What the lights of the board have done by the wall clock, for who asks later how bright they
+/// were while a shutter was open. One thread writes, any may ask. Of a light that is told the level
+/// u(t), the output r(t) follows with the time constant tau:
 ///
 ///     dr/dt = (u - r) / tau,   r = u once 16 tau have passed since u last changed            (1)
 ///     mean of r over [b, e] = (integral of u - tau (r(e) - r(b))) / (e - b)                  (2)

@@ -39,7 +39,7 @@ Result<Image<float>> ReadSites(const FrameFile& file, const Sensor& sensor, Imag
   for (int y = 0; y < size_px.height; ++y) {
     for (int x = 0; x < size_px.width; ++x) {
       const uint8_t colour = sensor.cfa[static_cast<size_t>(y % 2 * 2 + x % 2)];
-      const double i = photo->rgb[colour].At(x, y);
+      const auto i = static_cast<double>(photo->rgb[colour].At(x, y));
       if (!std::isfinite(i)) {
         return Fail(ErrorCode::kBadData, "{}: the pixel at ({}, {}) is not a finite number; {}",
                     file.path.string(), x, y, kHowToRender);

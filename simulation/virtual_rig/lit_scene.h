@@ -28,11 +28,11 @@ struct LitScene {
 /// Reads a session of linear frames, as `sateen simulate SCENE --linear -o DIR` writes it: one
 /// frame of each light, and dark frames, whose mean is the ambient light and is in every lit frame.
 ///
-/// Memory   4 bytes a site for each light and once more; 12 a site besides while a frame is read, on
-///          each thread
+/// Memory   4 bytes a site for each light and once more; 12 a site besides while a frame is read,
+///          on each thread
 /// Errors   kIo: a file is absent or unreadable
-///          kBadData: a file that is not what the session recorded; RAW or other frames that are not
-///          linear radiance; a light without a frame, no dark frame; a camera of unknown size
+///          kBadData: a file that is not what the session recorded; RAW or other frames that are
+///          not linear radiance; a light without a frame, no dark frame; a camera of unknown size
 ///          kInvalidArgument: the sensor; kCancelled
 [[nodiscard]] Result<LitScene> ReadLitScene(const std::filesystem::path& dir, const Sensor& sensor,
                                             const Task& task = {});

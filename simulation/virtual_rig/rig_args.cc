@@ -107,6 +107,7 @@ std::optional<int> ParseRigArgs(int argc, char** argv, RigArgs& args) {
   run->add_option("command", args.command, "The command and its arguments, after --")
       ->required()
       ->option_text("-- COMMAND ARGUMENTS ...");
+  run->footer("The commands of --fault and --at: sateen-virtual-rig --help");
   app.footer(kFooter);
   try {
     app.parse(argc, argv);

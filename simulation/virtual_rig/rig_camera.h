@@ -26,12 +26,11 @@ struct RigCameraOptions {
   std::chrono::nanoseconds rise = std::chrono::milliseconds(1);
 };
 
-// The camera of the virtual rig's program: a responder on the loopback interface, whose frames are of
-// a scene that the board lights. `log`, `loop` and `commands` must outlive it.
+// The camera of the virtual rig's program: a responder on the loopback interface, whose frames are
+// of a scene that the board lights. `log`, `loop` and `commands` must outlive it.
 class RigCamera {
  public:
-  // Errors of ReadLitScene(), PtpResponder::Start(), SceneCamera::SetAmbient(); kInvalidArgument: no
-  // such sensor.
+  // Errors of ReadLitScene(), PtpResponder::Start(), SceneCamera::SetAmbient(), SensorOf().
   static Result<std::unique_ptr<RigCamera>> Start(const RigCameraOptions& options, LightLog& log,
                                                   const RigLoop& loop, RigCommands& commands,
                                                   const Task& task = {});
@@ -50,7 +49,8 @@ class RigCamera {
   std::unique_ptr<PtpResponder> responder_;
 };
 
-// The sensor of a scene's rig as `options` say. kInvalidArgument: no such sensor, a level out of range.
+// The sensor of a scene's rig as `options` say. kInvalidArgument: no such sensor, a level out of
+// range.
 [[nodiscard]] Result<Sensor> SensorOf(const RigCameraOptions& options, const Rig& rig);
 
 }  // namespace sateen

@@ -16,8 +16,8 @@
 
 namespace sateen {
 
-// The commands of the virtual rig, at once or when a certain capture is asked for. The board belongs
-// to the thread of the loop, which calls Step(); the camera's threads call what says so.
+// The commands of the virtual rig, at once or when a certain capture is asked for. The board
+// belongs to the thread of the loop, which calls Step(); the camera's threads call what says so.
 class RigCommands {
  public:
   using Clock = std::chrono::steady_clock;

@@ -56,8 +56,8 @@ class RigLoop {
   void End();
 
   // A line of kBoardCommands; "flash" is the camera that closes its contact. Nothing where the verb
-  // is none of these; kInvalidArgument for what does not fit it. By the thread that calls Step(), as
-  // the action.
+  // is none of these; kInvalidArgument for what does not fit it. By the thread that calls Step(),
+  // as the action.
   [[nodiscard]] std::optional<Result<RigAction>> Parse(const std::string& line);
 
   // Writes down an event of now, the fields of its object without braces. By the same thread.
@@ -65,7 +65,8 @@ class RigLoop {
 
  private:
   [[nodiscard]] std::chrono::nanoseconds WallTime() const;
-  // When it is, or was, `time` by the wall clock; of times since the machine last kept it from running.
+  // When it is, or was, `time` by the wall clock; of times since the machine last kept it from
+  // running.
   [[nodiscard]] std::chrono::steady_clock::time_point WallClockAt(SimTime time) const;
   Status Act(const std::string& verb, SimTime time);
   void Say(SimTime time, const std::string& fields) const;

@@ -117,7 +117,7 @@ std::shared_ptr<const LitScene> SceneCamera::SceneWhenRead() {
 Status SceneCamera::ChangeScene(const std::filesystem::path& dir,
                                 std::function<void(const Status&)> told) {
   const Result<Rig> rig = ReadSceneRig(dir);
-  const Status same =
+  Status same =
       rig ? RequireSameRig(*rig, dir.string(), rig_, first_folder_) : tl::unexpected(rig.error());
   if (!same) {
     return same;

@@ -23,15 +23,15 @@ namespace sateen {
 // A frame as it was exposed, whatever a capture believes.
 struct ExposedFrame {
   FrameRequest request;
-  // Light by light, by what the pins did: the share of the exposure that it was on, times its level,
-  // as far as it had risen. Lights of share 0 are left out.
+  // Light by light, by what the pins did: the share of the exposure that it was on, times its
+  // level, as far as it had risen. Lights of share 0 are left out.
   std::map<std::string, double> shares;
   size_t bytes = 0;
 };
 
-// The virtual camera's view of a lit scene: each frame is lit by what the board's pins did while the
-// shutter was open. What can happen to a rig besides can be done to it. All calls may come from any
-// thread.
+// The virtual camera's view of a lit scene: each frame is lit by what the board's pins did while
+// the shutter was open. What can happen to a rig besides can be done to it. All calls may come from
+// any thread.
 class SceneCamera {
  public:
   // The exposure that Sensor::full_scale is of: H of 1/50 s, f/8, ISO 100.

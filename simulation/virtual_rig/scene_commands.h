@@ -29,7 +29,8 @@ inline constexpr std::string_view kSceneCommands =
 //                               frames (1); pixels
 //
 // `scene_read` is told by another thread how reading a scene has gone. Nothing where the verb is
-// none of these. kInvalidArgument for what does not fit it. `scene` and `camera` must outlive the action.
+// none of these. kInvalidArgument for what does not fit it. `scene` and `camera` must outlive the
+// action.
 [[nodiscard]] std::optional<Result<RigAction>> ParseSceneCommand(
     const std::string& line, SceneCamera& scene, VirtualCamera& camera,
     std::function<void(const std::string& dir, const Status&)> scene_read);

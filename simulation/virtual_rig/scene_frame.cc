@@ -134,9 +134,9 @@ class SiteReader {
  public:
   explicit SiteReader(const Sensor& sensor)
       : sensor_(sensor),
-        black_(static_cast<float>(sensor.black_dn)),
+        above_black_(static_cast<float>(sensor.black_dn + 0.5)),
         range_(static_cast<float>(sensor.white_dn - sensor.black_dn)),
-        top_(static_cast<float>(sensor.saturation_dn.value_or(sensor.white_dn))) {
+        above_top_(static_cast<float>(sensor.saturation_dn.value_or(sensor.white_dn) + 0.5)) {
     if (sensor.full_well_electrons) {
       const double read = sensor.read_noise_electrons / *sensor.full_well_electrons;
       per_well_ = static_cast<float>(1.0 / *sensor.full_well_electrons);
@@ -168,20 +168,21 @@ class SiteReader {
   void Read(std::span<float> row, uint16_t* dn) const {
     if (sensor_.compression != 0.0) {
       for (float& x : row) {
-        x = static_cast<float>(sensor_.Compressed(x));
+        x = static_cast<float>(sensor_.Compressed(static_cast<double>(x)));
       }
     }
     for (size_t x = 0; x < row.size(); ++x) {
-      const float reading = std::min(std::max(black_ + range_ * row[x], 0.0F), top_);
-      dn[x] = static_cast<uint16_t>(static_cast<int>(reading + 0.5F));
+      // Half a reading too much, of which the conversion takes the whole part.
+      const float above = std::min(std::max(above_black_ + range_ * row[x], 0.5F), above_top_);
+      dn[x] = static_cast<uint16_t>(static_cast<int>(above));
     }
   }
 
  private:
   const Sensor& sensor_;
-  float black_;
+  float above_black_;
   float range_;
-  float top_;
+  float above_top_;
   float per_well_ = 0.0F;
   float read_variance_ = 0.0F;
 };

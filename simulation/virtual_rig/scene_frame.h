@@ -39,8 +39,8 @@ struct FrameState {
 /// Pictures of share 0 cost nothing. The noise of a site depends on its place and on all of
 /// `state`, on nothing else: equal states are equal frames, and others are independent.
 ///
-/// Cost     one thread; at 16 megapixels 0.1 s for a light and ambient light, more where it is shifted
-///          (build/release/bin/virtual_camera_bench)
+/// Cost     one thread; at 16 megapixels 0.08 s for a light and ambient light, 0.12 s where it is
+///          shifted (build/release/bin/virtual_camera_bench)
 /// `state.shares` has one for each light. `sensor` must be valid.
 [[nodiscard]] Image<uint16_t> FrameOfScene(const LitScene& scene, const Sensor& sensor,
                                            const FrameState& state);

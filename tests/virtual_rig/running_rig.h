@@ -15,8 +15,8 @@
 #include <thread>
 #include <vector>
 
-// The programs as people start them: sateen-virtual-rig with the firmware, and under it sateen. These run
-// in real time; nothing depends on how fast the machine is.
+// The programs as people start them: sateen-virtual-rig with the firmware, and under it sateen.
+// These run in real time; nothing depends on how fast the machine is.
 namespace sateen::testing {
 
 using nlohmann::json;

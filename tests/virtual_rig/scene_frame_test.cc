@@ -64,12 +64,12 @@ TEST(SceneFrame, WithoutNoiseReadsAsTheSensorDoes) {
                 .knee = 0.5,
                 .compression = 0.2};
   FrameState state = Lit({{9, 1.0}});
-  state.exposure = 5.0;
+  state.exposure = 7.07;
   state.ambient = 0.0;
   Image3 radiance = SmallPicture(9);
   for (Image<float>& plane : radiance.planes) {
     for (float& value : plane.pixels) {
-      value *= 5.0F;
+      value *= 7.07F;
     }
   }
   const Image<uint16_t> expected = *Expose(sensor, radiance, /*seed=*/1);

@@ -38,8 +38,8 @@ inline Image3 SmallPicture(size_t light) {
   return picture;
 }
 
-// As `sateen simulate --linear` writes it: lit frames hold the ambient light. `spoil` may change the
-// session and the rig before they are written.
+// As `sateen simulate --linear` writes it: lit frames hold the ambient light. `spoil` may change
+// the session and the rig before they are written.
 inline void WriteSmallScene(const std::filesystem::path& dir, double ambient = kSmallAmbient,
                             const std::function<void(Session&, Rig&)>& spoil = {}) {
   Rig rig = RingRig(kSmallPx, LightModel::kNear);
