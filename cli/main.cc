@@ -13,6 +13,7 @@
 #include "cli/calibrate.h"
 #include "cli/devices.h"
 #include "cli/light.h"
+#include "cli/serve.h"
 #include "cli/session.h"
 #include "cli/simulate.h"
 #include "cli/solve.h"
@@ -44,6 +45,8 @@ int Run(int argc, char** argv) {
   sateen::cli::AddLight(app, light);
   sateen::cli::DevicesArgs devices;
   sateen::cli::AddDevices(app, devices);
+  sateen::cli::ServeArgs serve;
+  sateen::cli::AddServe(app, serve);
   sateen::cli::SessionVerifyArgs session_verify;
   sateen::cli::AddSession(app, session_verify);
   CLI::App* bench = app.add_subcommand("bench", "Measure speed against error on this machine");
@@ -79,6 +82,8 @@ int Run(int argc, char** argv) {
     status = RunLight(light, task, std::cout, std::cerr);
   } else if (app.got_subcommand("devices")) {
     status = RunDevices(devices, task, std::cout, std::cerr);
+  } else if (app.got_subcommand("serve")) {
+    status = RunServe(serve, task, std::cout, std::cerr);
   } else if (app.got_subcommand("session")) {
     status = RunSessionVerify(session_verify, task, std::cout, std::cerr);
   } else if (bench->got_subcommand("simulate")) {

@@ -8,7 +8,7 @@ using std::chrono::milliseconds;
 // Often enough for the board's 2 s of silence, and for noticing at once that a light went off.
 constexpr milliseconds kKeepAlive{250};
 // How soon a cancelled task is noticed.
-constexpr milliseconds kStep{50};
+constexpr milliseconds kCancelStep{50};
 
 // What the light did until it went off, by itself or because the task was cancelled.
 struct Lit {
@@ -20,8 +20,8 @@ struct Lit {
 Result<Lit> StayUntilOff(LightBoard& board, int channel, const Task& task) {
   Lit lit;
   while (true) {
-    for (milliseconds waited{0}; waited < kKeepAlive && !task.Cancelled(); waited += kStep) {
-      board.Wait(kStep);
+    for (milliseconds waited{0}; waited < kKeepAlive && !task.Cancelled(); waited += kCancelStep) {
+      board.Wait(kCancelStep);
     }
     if (task.Cancelled()) {
       lit.cancelled = true;
@@ -41,7 +41,7 @@ Result<Lit> StayUntilOff(LightBoard& board, int channel, const Task& task) {
 }
 
 // "500 ms" below a second, else in seconds.
-std::string TimeText(milliseconds time) {
+std::string OnTimeText(milliseconds time) {
   return time < milliseconds(1000)
              ? fmt::format("{} ms", time.count())
              : fmt::format("{:g} s", static_cast<double>(time.count()) / 1000.0);
@@ -78,7 +78,7 @@ Result<bool> KeepLightOn(const LightRequest& request, LightBoard& board, const T
         ErrorCode::kDevice,
         "light {} went off after {}, the longest that it may be on; if the LED bears more on its "
         "heat sink, raise that by 'sateen light limits {} --max-on TIME'",
-        name, TimeText(on_time), name);
+        name, OnTimeText(on_time), name);
   }
   return lit->cancelled;
 }
