@@ -12,7 +12,7 @@
 #include "cli/light.h"
 #include "scanner/daemon/http_client.h"
 #include "tests/cli/cli_runner.h"
-#include "tests/scanner/fake_board.h"
+#include "tests/daemon/daemon_fakes.h"
 #include "tests/testing/files.h"
 
 namespace sateen {
@@ -27,12 +27,11 @@ using testing::TempFolder;
 class Serving {
  public:
   Serving() {
+    rig_.held = false;
     args_.socket = folder_.Path() / "s.sock";
     setenv("SATEEN_SOCKET", args_.socket.c_str(), 1);
     thread_ = std::thread([this] {
-      auto devices =
-          std::make_unique<RigDevices>(std::make_unique<testing::FakePort>(board), nullptr);
-      status_ = cli::RunServeOn(args_, std::move(devices), {}, {.cancel = &cancel_}, out_, log_);
+      status_ = cli::RunServeOn(args_, rig_.Devices(), {}, {.cancel = &cancel_}, out_, log_);
     });
     while (!FindDaemon().value_or(std::nullopt)) {
       std::this_thread::yield();
@@ -53,9 +52,10 @@ class Serving {
   }
   [[nodiscard]] const std::filesystem::path& Socket() const { return args_.socket; }
 
-  FakeBoard board;
+  FakeBoard& Board() { return rig_.board; }  // once it has ended
 
  private:
+  testing::FakeRig rig_;
   TempFolder folder_;
   cli::ServeArgs args_;
   std::atomic<bool> cancel_ = false;
@@ -94,8 +94,8 @@ TEST(Serve, LightGoesThroughTheDaemon) {
   EXPECT_THAT(Light({"limits", "3", "--max-on", "20s"}).out, HasSubstr("20 s"));
   EXPECT_EQ(Light({"led-3"}).exit_status, 2);
   daemon.End();
-  EXPECT_EQ(daemon.board.lights_set.at(0).on_ms, 900);
-  EXPECT_EQ(daemon.board.executed[SATEEN_LIMIT_LIGHT], 1);
+  EXPECT_EQ(daemon.Board().lights_set.at(0).on_ms, 900);
+  EXPECT_EQ(daemon.Board().executed[SATEEN_LIMIT_LIGHT], 1);
 }
 
 TEST(Serve, DevicesAreTheDaemons) {
