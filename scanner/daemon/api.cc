@@ -120,7 +120,9 @@ ApiResponse Api::Handle(const ApiRequest& request) const {
     if (request.method == route.method) {
       return (this->*route.handler)(request, *parameter);
     }
-    allow += fmt::format("{}{}", allow.empty() ? "" : ", ", route.method);
+    if (allow.find(route.method) == std::string::npos) {
+      allow += fmt::format("{}{}", allow.empty() ? "" : ", ", route.method);
+    }
   }
   if (allow.empty()) {
     return Refused(404, {ErrorCode::kInvalidArgument,

@@ -13,6 +13,7 @@
 #include <list>
 #include <mutex>
 #include <string>
+#include <system_error>
 #include <thread>
 #include <utility>
 
@@ -23,7 +24,7 @@ namespace sateen {
 namespace {
 
 constexpr std::chrono::seconds kGrace{1};
-// When the system has no descriptors left, until some are closed.
+// When the system has no descriptors or memory left, until there are some again.
 constexpr std::chrono::milliseconds kPause{20};
 
 void RefuseBusy(int fd) {
@@ -103,7 +104,7 @@ class HttpServer::Impl {
           accept4(listener_.Descriptor(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK);
       if (fd >= 0) {
         Begin(fd);
-      } else if (errno == EMFILE || errno == ENFILE || errno == ENOBUFS || errno == ENOMEM) {
+      } else if (errno != EAGAIN && errno != EINTR) {
         std::this_thread::sleep_for(kPause);
       }
     }
@@ -123,7 +124,12 @@ class HttpServer::Impl {
       if (OpenCount() < options_.max_connections) {
         Client& client = clients_.emplace_back();
         client.fd = std::exchange(fd, -1);
-        client.thread = std::thread([this, &client] { Serve(client); });
+        try {
+          client.thread = std::thread([this, &client] { Serve(client); });
+        } catch (const std::system_error&) {  // no more threads
+          fd = client.fd;
+          clients_.pop_back();
+        }
       }
     }
     if (fd >= 0) {

@@ -178,6 +178,7 @@ TEST(Api, UnknownPathsAndMethodsAreRefused) {
   EXPECT_EQ(wrong.status, 405);
   EXPECT_EQ(wrong.allow, "GET, POST");
   EXPECT_EQ(daemon.Ask("POST", "/v1/state").allow, "GET");
+  EXPECT_EQ(daemon.Ask("GET", "/v1/lights/off").allow, "POST");
 }
 
 TEST(Api, WrongBodiesAre400AndNameTheKey) {

@@ -101,10 +101,10 @@ class StressClient {
  public:
   StressClient(StressedDaemon& daemon, std::uint64_t seed) : daemon_(daemon), random_(seed) {}
 
-  // `captures`: whether captures, which take longest, are among the calls.
-  void Call(bool captures) {
+  // A capture, or anything else.
+  void Call(bool capture) {
     const auto start = std::chrono::steady_clock::now();
-    const int kind = Any(captures ? 20 : 19);
+    const int kind = capture ? 19 : Any(19);
     if (kind < 9) {
       CallRight(kind);
     } else if (kind < 14) {
@@ -143,7 +143,12 @@ class StressClient {
     }
   }
 
-  std::string SomeJob() { return fmt::format("/v1/jobs/{}", 1 + Any(40)); }
+  // One of the latest, or one that is not known.
+  std::string SomeJob() {
+    const std::vector<JobRecord> jobs = daemon_.service.Jobs();
+    const std::uint64_t last = jobs.empty() ? 1 : jobs.back().id;
+    return fmt::format("/v1/jobs/{}", last + 5 - std::min<std::uint64_t>(random_() % 30, last));
+  }
 
   void CallRight(int kind) {
     switch (kind) {
@@ -154,11 +159,13 @@ class StressClient {
       case 2:
         return Expect("GET job", Ask("GET", SomeJob()), {200, 404});
       case 3:
-        return Expect("DELETE job", Ask("DELETE", CurrentJob()), {200, 202, 404});
+        return Expect("DELETE job", Ask("DELETE", Any(4) == 0 ? CurrentJob() : SomeJob()),
+                      {200, 202, 404});
       case 4:
         return Expect("GET board", Ask("GET", "/v1/board"), {200, 409, 503});
       case 5:
-        return Expect("lights off", Ask("POST", "/v1/lights/off"), {200, 202, 503});
+        return Any(8) == 0 ? Expect("lights off", Ask("POST", "/v1/lights/off"), {200, 202, 503})
+                           : Expect("wrong method", Ask("GET", "/v1/lights/off"), {405});
       case 6:
         return FollowForAWhile();
       default:
