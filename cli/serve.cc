@@ -17,7 +17,7 @@ namespace sateen::cli {
 namespace {
 
 // How soon a signal is heard.
-constexpr std::chrono::milliseconds kStep{50};
+constexpr std::chrono::milliseconds kSignalStep{50};
 
 struct Door {
   Listener listener;
@@ -107,7 +107,7 @@ int RunServeOn(const ServeArgs& args, std::unique_ptr<RigDevices> devices,
     out << "listening on " << servers.back()->GetListener().Name() << '\n' << std::flush;
   }
   while (!task.Cancelled()) {
-    std::this_thread::sleep_for(kStep);
+    std::this_thread::sleep_for(kSignalStep);
   }
   // The job first: its followers are told its end before their connections are closed.
   service.Stop();

@@ -26,7 +26,8 @@ struct ApiResponse {
   };
 
   int status = 200;
-  std::string body;   // JSON
+  std::string body;
+  std::string content_type = "application/json";
   std::string allow;  // methods of the path, of a 405
   std::optional<Events> events;
 };

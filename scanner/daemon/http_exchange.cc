@@ -155,7 +155,8 @@ void HttpExchange::Send(const ApiResponse& answer, httplib::Response& response) 
     response.set_header("WWW-Authenticate", "Bearer");
   }
   if (!answer.events) {
-    response.set_content(answer.body + "\n", kJson);
+    response.set_content(answer.content_type == kJson ? answer.body + "\n" : answer.body,
+                         answer.content_type);
     return;
   }
   if (context_.streams >= context_.options.max_streams) {
