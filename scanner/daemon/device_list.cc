@@ -105,11 +105,14 @@ Result<std::vector<DeviceReply>> DevicesFromJson(const std::string& text) {
   JsonReader json(*parsed, where);
   std::vector<DeviceReply> devices;
   for (JsonReader& found : json.Objects("devices")) {
-    const Result<DeviceReply> device = ReadDevice(found);
+    Result<DeviceReply> device = ReadDevice(found);
     if (!device) {
       return tl::unexpected(device.error());
     }
-    devices.push_back(*device);
+    // A text or null, which readers of optional texts refuse.
+    const nlohmann::json usb = parsed->at("devices")[devices.size()].value("usb", nlohmann::json());
+    device->usb = usb.is_string() ? usb.get<std::string>() : "";
+    devices.push_back(*std::move(device));
   }
   const Status status = json.Finish();
   return status ? Result<std::vector<DeviceReply>>(std::move(devices))

@@ -1,7 +1,6 @@
 #include "scanner/daemon/rig_jobs.h"
 
 #include <algorithm>
-#include <numeric>
 #include <utility>
 
 #include "scanner/daemon/answer_json.h"
@@ -67,6 +66,12 @@ void AskBoard(std::vector<DeviceReply>& devices, RigDevices& rig) {
       reply.what = board ? "not asked: the daemon has another board" : board.error().message;
     }
   }
+  // Where the system shows nothing that could be it, the daemon's own word tells what is missing.
+  const auto may_be_board = [](const SerialPortInfo& port) { return port.may_be_board; };
+  if (!board && (!ports || std::ranges::none_of(*ports, may_be_board))) {
+    devices.push_back(
+        {.port = "-", .description = "the LED board of the daemon", .what = board.error().message});
+  }
   if (board) {
     const DeviceReply named = {.port = (*board)->PortName(),
                                .description = "the port of the daemon"};
@@ -82,6 +87,12 @@ void AskCamera(std::vector<DeviceReply>& devices, RigDevices& rig) {
     if (reply.what.empty()) {
       reply.what = camera ? "not asked: the daemon has another camera" : camera.error().message;
     }
+  }
+  if (!camera && cameras.empty()) {
+    devices.push_back({.port = "-",
+                       .description = "the camera of the daemon",
+                       .is_camera = true,
+                       .what = camera.error().message});
   }
   if (camera && rig.OpenCamera()) {
     const DeviceReply named = {.port = rig.OpenCamera()->port,

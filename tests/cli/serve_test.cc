@@ -106,12 +106,11 @@ TEST(Serve, DevicesAreTheDaemons) {
   EXPECT_THAT(devices.out, HasSubstr("LED board, firmware fakefake"));
 }
 
-TEST(Serve, WithoutADaemonLightOpensAPortItself) {
-  setenv("SATEEN_SOCKET", "", 1);
-  const RunResult none = Light({"status"});
-  EXPECT_EQ(none.exit_status, 5);  // no board here
-  EXPECT_THAT(none.log, HasSubstr("port"));
-  unsetenv("SATEEN_SOCKET");
+TEST(Serve, APortThatIsNamedIsOpenedByTheCommandItself) {
+  const Serving daemon;
+  const RunResult named = Light({"status", "--port", "/nowhere/ttyACM7"});
+  EXPECT_EQ(named.exit_status, 5);
+  EXPECT_THAT(named.log, HasSubstr("/nowhere/ttyACM7"));
 }
 
 RunResult Serve(std::vector<std::string> words) {

@@ -154,6 +154,37 @@ TEST(Api, DevicesAreTheDaemonsOwn) {
   EXPECT_EQ(Body(daemon.Ask("GET", "/v1/state"))["camera"]["model"], "fake camera");
 }
 
+TEST(Api, DevicesTellWhatIsMissing) {
+  FakeDaemon daemon;
+  daemon.rig.board.plugged = false;
+  const Result<std::vector<DeviceReply>> devices =
+      DevicesFromJson(daemon.Ask("GET", "/v1/devices").body);
+  ASSERT_TRUE(devices) << devices.error().message;
+  EXPECT_TRUE(std::ranges::any_of(*devices, [](const DeviceReply& device) {
+    return !device.is_camera && device.what == "fake: not there";
+  }));
+}
+
+TEST(ApiJson, DevicesSurviveThereAndBack) {
+  const std::vector<DeviceReply> devices = {
+      {.port = "/dev/ttyACM0",
+       .usb = "2341:0043",
+       .description = "Arduino Uno",
+       .serial = "7",
+       .answers = true,
+       .what = "LED board",
+       .firmware = "1a2b",
+       .protocol = "1.0",
+       .lights = 14},
+      {.port = "/dev/ttyS0", .what = "not asked"},
+      {.port = "usb:001,004", .is_camera = true, .answers = true, .model = "D5100"}};
+  const std::string text = DevicesJson(devices, -1);
+  const Result<std::vector<DeviceReply>> back = DevicesFromJson(text);
+  ASSERT_TRUE(back) << back.error().message;
+  EXPECT_EQ(DevicesJson(*back, -1), text);
+  EXPECT_EQ(back->at(0).usb, "2341:0043");
+}
+
 TEST(Api, AMissingBoardIs503WithItsMessage) {
   FakeDaemon daemon;
   daemon.rig.board.plugged = false;
