@@ -83,6 +83,20 @@ int DryRun(const CaptureArgs& args, const CaptureRequest& request, RigDevices& d
   return 0;
 }
 
+int ReportCapture(const CaptureArgs& args, const CaptureRequest& request,
+                  const Result<CaptureSummary>& summary, const Task& task, std::ostream& out,
+                  std::ostream& log) {
+  task.ClearProgress();
+  const Result<Rig> rig =
+      summary ? ReadRig(request.output / summary->session.rig) : tl::unexpected(summary.error());
+  if (!rig) {
+    return Report(rig.error(), log);
+  }
+  out << (args.json ? CaptureJson(request.output, *rig, *summary)
+                    : CaptureText(request.output, *rig, *summary));
+  return 0;
+}
+
 }  // namespace
 
 void AddCapture(CLI::App& root, CaptureArgs& args) {
@@ -145,8 +159,32 @@ void AddCapture(CLI::App& root, CaptureArgs& args) {
 
 int RunCaptureCommand(const CaptureArgs& args, const Task& task, std::ostream& out,
                       std::ostream& log) {
+  const Result<std::optional<DaemonClient>> daemon = DaemonFor(args.devices);
+  if (!daemon) {
+    return Report(daemon.error(), log);
+  }
+  if (*daemon) {
+    return RunCaptureByDaemon(args, **daemon, task, out, log);
+  }
   RigDevices devices(args.devices);
   return RunCaptureWith(args, devices, task, out, log);
+}
+
+int RunCaptureByDaemon(const CaptureArgs& args, const DaemonClient& daemon, const Task& task,
+                       std::ostream& out, std::ostream& log) {
+  const Result<CaptureRequest> request = RequestOf(args);
+  if (!request) {
+    return Report(request.error(), log);
+  }
+  if (args.dry_run) {
+    return Report({ErrorCode::kDevice,
+                   fmt::format("the daemon at {} has the rig, and a dry run opens board and camera "
+                               "by itself; stop it first, or name them: --port, --camera",
+                               daemon.Socket().string())},
+                  log);
+  }
+  return ReportCapture(args, *request, CaptureByDaemon(daemon, *request, task, ShowOn(task)), task,
+                       out, log);
 }
 
 int RunCaptureWith(const CaptureArgs& args, RigDevices& devices, const Task& task,
@@ -158,18 +196,8 @@ int RunCaptureWith(const CaptureArgs& args, RigDevices& devices, const Task& tas
   if (args.dry_run) {
     return DryRun(args, *request, devices, out, log);
   }
-  const Result<CaptureSummary> summary = RunCapture(*request, devices, task, ShowOn(task));
-  task.ClearProgress();
-  if (!summary) {
-    return Report(summary.error(), log);
-  }
-  const Result<Rig> rig = ReadRig(request->output / summary->session.rig);
-  if (!rig) {
-    return Report(rig.error(), log);
-  }
-  out << (args.json ? CaptureJson(request->output, *rig, *summary)
-                    : CaptureText(request->output, *rig, *summary));
-  return 0;
+  return ReportCapture(args, *request, RunCapture(*request, devices, task, ShowOn(task)), task, out,
+                       log);
 }
 
 }  // namespace sateen::cli

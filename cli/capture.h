@@ -7,6 +7,7 @@
 
 #include "core/task.h"
 #include "scanner/capture_request.h"
+#include "scanner/daemon/http_client.h"
 
 namespace sateen::cli {
 
@@ -26,12 +27,15 @@ struct CaptureArgs {
 
 void AddCapture(CLI::App& root, CaptureArgs& args);
 
-// Returns the exit status.
+// Asks the daemon where one is running and args name no device, else opens board and camera. Returns
+// the exit status.
 int RunCaptureCommand(const CaptureArgs& args, const Task& task, std::ostream& out,
                       std::ostream& log);
-// The same on devices that a test gives.
+// The same on devices that a test gives, and by a daemon.
 int RunCaptureWith(const CaptureArgs& args, RigDevices& devices, const Task& task,
                    std::ostream& out, std::ostream& log);
+int RunCaptureByDaemon(const CaptureArgs& args, const DaemonClient& daemon, const Task& task,
+                       std::ostream& out, std::ostream& log);
 
 // What a capture and a dry run report, as text and as JSON (docs/formats.md).
 [[nodiscard]] std::string CaptureText(const std::filesystem::path& session, const Rig& rig,

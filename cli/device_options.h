@@ -1,7 +1,9 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <optional>
 
+#include "scanner/daemon/http_client.h"
 #include "scanner/rig_devices.h"
 
 namespace sateen::cli {
@@ -16,6 +18,14 @@ inline void AddDeviceOptions(CLI::App& cmd, RigDeviceNames& devices) {
                  "Camera: usb:BUS,DEVICE, ptpip:ADDRESS, or folder:DIR for files that another "
                  "program drops; default: the only one on USB")
       ->envname("SATEEN_CAMERA");
+}
+
+// The daemon that is running, unless a device is named.
+inline Result<std::optional<DaemonClient>> DaemonFor(const RigDeviceNames& devices) {
+  if (!devices.port.empty() || !devices.camera.empty()) {
+    return std::optional<DaemonClient>();
+  }
+  return FindDaemon();
 }
 
 }  // namespace sateen::cli

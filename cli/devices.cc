@@ -1,92 +1,88 @@
 #include "cli/devices.h"
 
 #include <algorithm>
-#include <nlohmann/json.hpp>
+#include <optional>
 #include <ostream>
 #include <utility>
 
+#include "scanner/daemon/device_list.h"
+#include "scanner/daemon/http_client.h"
 #include "scanner/light_board.h"
 
 namespace sateen::cli {
 namespace {
 
-struct Device {
-  SerialPortInfo port;
-  bool is_board = false;
-  std::string what;  // what it said, or why it is taken for none
-  BoardInfo info;
-};
-
-std::string UsbText(const SerialPortInfo& port) {
-  return port.usb ? fmt::format("{:04x}:{:04x}", port.usb->vendor, port.usb->product) : "-";
-}
-
-void Ask(Device& device, std::unique_ptr<BytePort> port) {
+void AskPort(DeviceReply& device, std::unique_ptr<BytePort> port) {
   LightBoard board(std::move(port));
   const Status connected = board.Connect();
   if (!connected) {
     device.what = connected.error().message;
     return;
   }
-  device.is_board = true;
-  device.info = board.Info();
-  device.what = fmt::format("LED board, firmware {}, protocol {}, {} lights", device.info.build_id,
-                            device.info.protocol, device.info.lights.size());
+  TakeBoard(device, board.Info());
 }
 
-struct CameraReply {
-  UsbCamera found;
-  bool answers = false;
-  std::string what;  // what it said, or why it cannot be used
-  CameraInfo info;
-};
-
 // What a capture would meet.
-CameraReply Connect(const UsbCamera& found) {
-  CameraReply camera = {.found = found, .what = found.obstacle};
-  if (!camera.what.empty()) {
-    return camera;
+DeviceReply ConnectCamera(const UsbCamera& found) {
+  DeviceReply device = ReplyOf(found);
+  if (!device.what.empty()) {
+    return device;
   }
   const Result<std::unique_ptr<TetheredCamera>> made = MakeTetheredCamera(found.port);
   const Result<CameraInfo> info =
       made ? (*made)->Open() : Result<CameraInfo>(tl::unexpected(made.error()));
   if (!info) {
-    camera.what = info.error().message;
-    return camera;
+    device.what = info.error().message;
+    return device;
   }
-  camera.answers = true;
-  camera.info = *info;
-  camera.what = fmt::format("camera {}, profile {}, ready to capture", info->model, info->profile);
-  return camera;
+  TakeCamera(device, *info);
+  return device;
 }
 
-nlohmann::json ToJson(const CameraReply& camera) {
-  nlohmann::json json = {{"port", camera.found.port},
-                         {"description", camera.found.description},
-                         {"kind", "camera"},
-                         {"ready", camera.answers},
-                         {"what", camera.what}};
-  if (camera.answers) {
-    json["model"] = camera.info.model;
-    json["profile"] = camera.info.profile;
+void PrintDevices(const std::vector<DeviceReply>& devices, std::ostream& out) {
+  for (const DeviceReply& device : devices) {
+    out << fmt::format("{:<14} {:<9} {}\n{:24} {}\n", device.port,
+                       device.usb.empty() ? "-" : device.usb, device.description, "", device.what);
   }
-  return json;
+  if (std::ranges::none_of(devices, &DeviceReply::is_camera)) {
+    out << fmt::format("{:<24} {}\n", "no camera",
+                       "none on USB: switch it on, use a cable with data lines; one on the "
+                       "network: --camera ptpip:ADDRESS");
+  }
 }
 
-nlohmann::json ToJson(const Device& device) {
-  nlohmann::json json = {
-      {"port", device.port.name},
-      {"usb", device.port.usb ? nlohmann::json(UsbText(device.port)) : nlohmann::json()},
-      {"description", device.port.description},
-      {"serial", device.port.serial},
-      {"kind", device.is_board ? "led-board" : "unknown"},
-      {"what", device.what}};
-  if (device.is_board) {
-    json["firmware"] = device.info.build_id;
-    json["protocol"] = device.info.protocol;
-    json["lights"] = device.info.lights.size();
+int DevicesFailed(const Error& error, std::ostream& log) {
+  log << "sateen devices: error: " << error.message << '\n';
+  return ExitStatus(error);
+}
+
+// `asked`: whether a port was asked at all.
+int ReportDevices(const DevicesArgs& args, const std::vector<DeviceReply>& devices, bool asked,
+                  std::ostream& out, std::ostream& log) {
+  if (args.json) {
+    out << DevicesJson(devices, /*indent=*/2) << '\n';
+  } else {
+    PrintDevices(devices, out);
   }
-  return json;
+  if (std::ranges::any_of(devices, [](const auto& d) { return d.answers && !d.is_camera; })) {
+    return 0;
+  }
+  const auto ports = std::ranges::count(devices, false, &DeviceReply::is_camera);
+  return DevicesFailed(
+      {ErrorCode::kDevice,
+       asked ? "no LED board answered; mend what is said of each port above, or upload "
+               "the firmware (make flash)"
+             : fmt::format("no LED board among {} serial port{}; plug it in, or name its "
+                           "port with --port",
+                           ports, ports == 1 ? "" : "s")},
+      log);
+}
+
+int RunDevicesByDaemon(const DevicesArgs& args, const DaemonClient& daemon, std::ostream& out,
+                       std::ostream& log) {
+  const Result<std::vector<DeviceReply>> devices = DevicesByDaemon(daemon);
+  return devices ? ReportDevices(args, *devices, /*asked=*/true, out, log)
+                 : DevicesFailed(devices.error(), log);
 }
 
 }  // namespace
@@ -106,10 +102,18 @@ void AddDevices(CLI::App& root, DevicesArgs& args) {
 }
 
 int RunDevices(const DevicesArgs& args, const Task& task, std::ostream& out, std::ostream& log) {
+  if (args.port.empty() && args.camera.empty()) {
+    const Result<std::optional<DaemonClient>> daemon = FindDaemon();
+    if (!daemon) {
+      return DevicesFailed(daemon.error(), log);
+    }
+    if (*daemon) {
+      return RunDevicesByDaemon(args, **daemon, out, log);
+    }
+  }
   Result<std::vector<SerialPortInfo>> ports = ListSerialPorts();
   if (!ports && args.port.empty()) {
-    log << "sateen devices: error: " << ports.error().message << '\n';
-    return ExitStatus(ports.error());
+    return DevicesFailed(ports.error(), log);
   }
   return RunDevicesAmong(args, ports ? *std::move(ports) : std::vector<SerialPortInfo>{},
                          MakeSerialPort, task, out, log, ListUsbCameras());
@@ -118,7 +122,7 @@ int RunDevices(const DevicesArgs& args, const Task& task, std::ostream& out, std
 int RunDevicesAmong(const DevicesArgs& args, std::vector<SerialPortInfo> ports,
                     const std::function<std::unique_ptr<BytePort>(const std::string&)>& open,
                     const Task& task, std::ostream& out, std::ostream& log,
-                    const std::vector<UsbCamera>& found_cameras) {
+                    const std::vector<UsbCamera>& cameras) {
   if (!args.port.empty()) {
     auto named = std::ranges::find(ports, args.port, &SerialPortInfo::name);
     if (named == ports.end()) {
@@ -126,65 +130,25 @@ int RunDevicesAmong(const DevicesArgs& args, std::vector<SerialPortInfo> ports,
     }
     named->may_be_board = true;
   }
-  std::vector<Device> devices;
+  std::vector<DeviceReply> devices;
   for (const SerialPortInfo& port : ports) {
     if (const Status going = task.CheckCancelled(); !going) {
-      log << "sateen devices: error: " << going.error().message << '\n';
-      return ExitStatus(going.error());
+      return DevicesFailed(going.error(), log);
     }
-    devices.push_back({.port = port, .what = "not asked: not the USB id of an Arduino"});
+    devices.push_back(ReplyOf(port));
     if (port.may_be_board) {
-      Ask(devices.back(), open(port.name));
+      AskPort(devices.back(), open(port.name));
     }
   }
-  std::vector<CameraReply> cameras;
-  cameras.reserve(found_cameras.size() + 1);
-  for (const UsbCamera& found : found_cameras) {
-    cameras.push_back(Connect(found));
+  for (const UsbCamera& found : cameras) {
+    devices.push_back(ConnectCamera(found));
   }
-  if (!args.camera.empty() && std::ranges::none_of(found_cameras, [&](const UsbCamera& found) {
-        return found.port == args.camera;
-      })) {
-    cameras.push_back(Connect({.port = args.camera, .description = "named with --camera"}));
+  if (!args.camera.empty() &&
+      std::ranges::find(cameras, args.camera, &UsbCamera::port) == cameras.end()) {
+    devices.push_back(ConnectCamera({.port = args.camera, .description = "named with --camera"}));
   }
-  if (args.json) {
-    nlohmann::json json = {{"schema", "sateen.devices/1"}, {"devices", nlohmann::json::array()}};
-    for (const Device& device : devices) {
-      json["devices"].push_back(ToJson(device));
-    }
-    for (const CameraReply& camera : cameras) {
-      json["devices"].push_back(ToJson(camera));
-    }
-    out << json.dump(2) << '\n';
-  } else {
-    for (const Device& device : devices) {
-      out << fmt::format("{:<14} {:<9} {}\n{:24} {}\n", device.port.name, UsbText(device.port),
-                         device.port.description, "", device.what);
-    }
-  }
-  if (!args.json) {
-    for (const CameraReply& camera : cameras) {
-      out << fmt::format("{:<14} {:<9} {}\n{:24} {}\n", camera.found.port, "-",
-                         camera.found.description, "", camera.what);
-    }
-    if (cameras.empty()) {
-      out << fmt::format("{:<24} {}\n", "no camera",
-                         "none on USB: switch it on, use a cable with data lines; one on the "
-                         "network: --camera ptpip:ADDRESS");
-    }
-  }
-  if (std::ranges::none_of(devices, &Device::is_board)) {
-    const bool was_asked =
-        std::ranges::any_of(devices, [](const Device& device) { return device.port.may_be_board; });
-    log << (was_asked
-                ? std::string("sateen devices: error: no LED board answered; mend what is said of "
-                              "each port above, or upload the firmware (make flash)\n")
-                : fmt::format("sateen devices: error: no LED board among {} serial port{}; plug it "
-                              "in, or name its port with --port\n",
-                              devices.size(), devices.size() == 1 ? "" : "s"));
-    return ExitStatus({ErrorCode::kDevice, ""});
-  }
-  return 0;
+  return ReportDevices(args, devices, std::ranges::any_of(ports, &SerialPortInfo::may_be_board),
+                       out, log);
 }
 
 }  // namespace sateen::cli

@@ -21,7 +21,8 @@ struct DevicesArgs {
 
 void AddDevices(CLI::App& root, DevicesArgs& args);
 
-// Returns the exit status: 5 where no device answered.
+// Returns the exit status: 5 where no board answered. Asks the daemon where one is running and args
+// name no device of their own.
 int RunDevices(const DevicesArgs& args, const Task& task, std::ostream& out, std::ostream& log);
 // The same over ports and cameras that a test gives; those without an obstacle are connected to.
 int RunDevicesAmong(const DevicesArgs& args, std::vector<SerialPortInfo> ports,

@@ -2,12 +2,15 @@
 
 #include <algorithm>
 #include <charconv>
+#include <functional>
 #include <ostream>
 #include <utility>
 
 #include "cli/light_report.h"
 #include "cli/quantity.h"
 #include "rig/rig.h"
+#include "scanner/daemon/board_job.h"
+#include "scanner/daemon/light_job.h"
 #include "scanner/light_board.h"
 #include "scanner/serial_port.h"
 
@@ -15,11 +18,6 @@ namespace sateen::cli {
 namespace {
 
 using std::chrono::milliseconds;
-
-// Often enough for the board's 2 s of silence, and for noticing at once that a light went off.
-constexpr milliseconds kKeepAlive{250};
-// How soon Ctrl-C is heard.
-constexpr milliseconds kStep{50};
 
 std::optional<int> Number(const std::string& text) {
   int number = 0;
@@ -60,188 +58,109 @@ Result<std::optional<int>> NamedChannel(const LightArgs& args) {
   return channel ? Result<std::optional<int>>(*channel) : tl::unexpected(channel.error());
 }
 
-// What the light did until it went off, by itself or by Ctrl-C.
-struct Lit {
-  bool cancelled = false;
-  milliseconds lasted{0};  // as the board last said
-  int fault = 0;
+// The rig, over its own port or by the daemon.
+struct LightRig {
+  std::function<Result<BoardWord>(const BoardChange&)> change;
+  std::function<Status()> all_off;
+  std::function<Result<bool>(const LightRequest&, const std::function<void(const LightOn&)>&)>
+      keep_on;
 };
 
-// Stays with the light: the board turns it off when it hears nothing.
-Result<Lit> StayUntilOff(LightBoard& board, int channel, const Task& task) {
-  Lit lit;
-  while (true) {
-    for (milliseconds waited{0}; waited < kKeepAlive && !task.Cancelled(); waited += kStep) {
-      board.Wait(kStep);
-    }
-    if (task.Cancelled()) {
-      lit.cancelled = true;
-      const Result<BoardState> off = board.AllOff();
-      return off ? Result<Lit>(lit) : tl::unexpected(off.error());
-    }
-    const Result<BoardReport> report = board.Report();
-    if (!report) {
-      return tl::unexpected(report.error());
-    }
-    lit.fault = report->state.fault;
-    if ((report->state.lit >> channel & 1u) == 0) {
-      return lit;
-    }
-    lit.lasted = report->state.lit_for;
-  }
-}
-
-Status TurnOn(const LightArgs& args, int channel, LightBoard& board, const Task& task,
-              std::ostream& out) {
+Status TurnOn(const LightArgs& args, int channel, const LightRig& rig, std::ostream& out) {
   const Result<double> level = ParseLevel(args.level);
   if (!level) {
     return tl::unexpected(level.error());
   }
-  const auto index = static_cast<std::size_t>(channel);
-  milliseconds on_time = channel >= 0 && index < board.Info().lights.size()
-                             ? board.Info().lights[index].max_on
-                             : milliseconds(1);
+  LightRequest request = {.channel = channel, .name = args.what, .level = *level};
   if (!args.on_time.empty()) {
     const Result<milliseconds> asked = ParseDuration(args.on_time);
     if (!asked) {
       return tl::unexpected(asked.error());
     }
-    on_time = *asked;
+    request.on_time = *asked;
   }
-  const Result<BoardState> on = board.SetLight(channel, *level, on_time);
-  if (!on) {
-    return tl::unexpected(on.error());
-  }
-  if (*level == 0.0) {
-    out << fmt::format("light {} off\n", args.what);
-    return {};
-  }
-  out << fmt::format("light {} on at {} for {}{}\n", args.what, LevelText(on->level),
-                     args.on_time.empty() ? "at most " : "", DurationText(on_time))
-      << std::flush;
-  const Result<Lit> lit = StayUntilOff(board, channel, task);
-  if (!lit) {
-    return tl::unexpected(lit.error());
-  }
-  if (lit->fault != on->fault && lit->fault != 0) {
-    return Fail(ErrorCode::kDevice, "light {} went off: fault {}: {}", args.what, lit->fault,
-                FaultText(lit->fault));
-  }
-  if (!lit->cancelled && args.on_time.empty()) {
-    return Fail(
-        ErrorCode::kDevice,
-        "light {} went off after {}, the longest that it may be on; if the LED bears more on its "
-        "heat sink, raise that by 'sateen light limits {} --max-on TIME'",
-        args.what, DurationText(on_time), args.what);
+  const Result<bool> was_on = rig.keep_on(request, [&](const LightOn& on) {
+    out << fmt::format("light {} on at {} for {}{}\n", args.what, LevelText(on.level),
+                       args.on_time.empty() ? "at most " : "", DurationText(on.on_time))
+        << std::flush;
+  });
+  if (!was_on) {
+    return tl::unexpected(was_on.error());
   }
   out << fmt::format("light {} off\n", args.what);
   return {};
 }
 
-Status ShowStatus(const LightArgs& args, LightBoard& board, std::ostream& out) {
-  if (args.clear_fault) {
-    const Result<BoardState> cleared = board.ClearFault(board.Info().fault);
-    if (!cleared) {
-      return tl::unexpected(cleared.error());
-    }
-  }
-  const Result<BoardReport> report = board.Report();
-  if (!report) {
-    return tl::unexpected(report.error());
-  }
-  out << (args.json ? StatusJson(board.PortName(), board.Info(), *report)
-                    : StatusText(board.PortName(), board.Info(), *report));
-  return {};
-}
-
-Status SetLimits(const LightArgs& args, std::optional<int> named, LightBoard& board) {
-  std::optional<double> max_level;
-  std::optional<milliseconds> max_on;
+Result<BoardChange> ChangeOf(const LightArgs& args, std::optional<int> channel) {
+  BoardChange change = {.clear_fault = args.clear_fault, .channel = channel};
   if (!args.max_level.empty()) {
     const Result<double> level = ParseLevel(args.max_level);
     if (!level) {
       return tl::unexpected(level.error());
     }
-    max_level = *level;
+    change.max_level = *level;
   }
   if (!args.max_on.empty()) {
     const Result<milliseconds> time = ParseDuration(args.max_on);
     if (!time) {
       return tl::unexpected(time.error());
     }
-    max_on = *time;
+    change.max_on = *time;
   }
-  if (!max_level && !max_on) {
-    return {};
+  if (args.max_lit != 0) {
+    change.max_lit = args.max_lit;
   }
-  const int first = named.value_or(0);
-  const int last = named.value_or(static_cast<int>(board.Info().lights.size()) - 1);
-  for (int channel = first; channel <= last; ++channel) {
-    const auto index = static_cast<std::size_t>(channel);
-    const LightLimits old = channel >= 0 && index < board.Info().lights.size()
-                                ? board.Info().lights[index]
-                                : LightLimits{.max_on = milliseconds(1)};
-    const Result<BoardState> set = board.Limit(
-        channel,
-        {.max_level = max_level.value_or(old.max_level), .max_on = max_on.value_or(old.max_on)});
-    if (!set) {
-      return tl::unexpected(set.error());
+  for (int dim_clock = 0; dim_clock < 3; ++dim_clock) {
+    if (args.dim == DimClockText(dim_clock)) {
+      change.dim_clock = dim_clock;
     }
+  }
+  if (!args.sync.empty()) {
+    change.sync_rising = args.sync == "rising";
+  }
+  return change;
+}
+
+Status ShowBoard(const LightArgs& args, std::optional<int> channel, const LightRig& rig,
+                 std::ostream& out) {
+  const Result<BoardChange> change = ChangeOf(args, channel);
+  if (!change) {
+    return tl::unexpected(change.error());
+  }
+  const Result<BoardWord> word = rig.change(*change);
+  if (!word) {
+    return tl::unexpected(word.error());
+  }
+  if (args.what == "limits") {
+    out << LimitsText(word->info);
+  } else {
+    out << (args.json ? StatusJson(word->port, word->info, word->report)
+                      : StatusText(word->port, word->info, word->report));
   }
   return {};
 }
 
-Status Configure(const LightArgs& args, LightBoard& board) {
-  if (args.max_lit == 0 && args.dim.empty() && args.sync.empty()) {
-    return {};
-  }
-  BoardSettings settings = board.Info().settings;
-  if (args.max_lit != 0) {
-    settings.max_lit = args.max_lit;
-  }
-  for (int dim_clock = 0; dim_clock < 3; ++dim_clock) {
-    if (args.dim == DimClockText(dim_clock)) {
-      settings.dim_clock = dim_clock;
-    }
-  }
-  if (!args.sync.empty()) {
-    settings.sync_rising = args.sync == "rising";
-  }
-  const Result<BoardState> set = board.Configure(settings);
-  return set ? Status{} : tl::unexpected(set.error());
-}
-
-Status Run(const LightArgs& args, LightBoard& board, const Task& task, std::ostream& out) {
-  // Before the port is opened, which restarts an Uno.
-  const Result<std::optional<int>> channel = NamedChannel(args);
-  if (!channel) {
-    return tl::unexpected(channel.error());
-  }
-  if (Status connected = board.Connect(); !connected) {
-    return connected;
-  }
-  if (args.what == "status") {
-    return ShowStatus(args, board, out);
-  }
-  if (args.what == "limits") {
-    Status set = SetLimits(args, *channel, board);
-    if (set) {
-      set = Configure(args, board);
-    }
-    if (set) {
-      out << LimitsText(board.Info());
-    }
-    return set;
+Status Run(const LightArgs& args, std::optional<int> channel, const LightRig& rig,
+           std::ostream& out) {
+  if (args.what == "status" || args.what == "limits") {
+    return ShowBoard(args, channel, rig, out);
   }
   if (args.what == "off") {
-    const Result<BoardState> off = board.AllOff();
-    if (!off) {
-      return tl::unexpected(off.error());
+    const Status off = rig.all_off();
+    if (off) {
+      out << "all lights off\n";
     }
-    out << "all lights off\n";
-    return {};
+    return off;
   }
-  return TurnOn(args, **channel, board, task, out);
+  return TurnOn(args, *channel, rig, out);
+}
+
+int LightEnded(const Status& done, std::ostream& log) {
+  if (!done) {
+    log << "sateen light: error: " << done.error().message << '\n';
+    return ExitStatus(done.error());
+  }
+  return 0;
 }
 
 }  // namespace
@@ -299,18 +218,55 @@ void AddLight(CLI::App& root, LightArgs& args) {
 }
 
 int RunLight(const LightArgs& args, const Task& task, std::ostream& out, std::ostream& log) {
+  if (args.port.empty()) {
+    const Result<std::optional<DaemonClient>> daemon = FindDaemon();
+    if (!daemon) {
+      return LightEnded(tl::unexpected(daemon.error()), log);
+    }
+    if (*daemon) {
+      return RunLightByDaemon(args, **daemon, task, out, log);
+    }
+  }
   return RunLightOn(args, MakeSerialPort(args.port), task, out, log);
+}
+
+int RunLightByDaemon(const LightArgs& args, const DaemonClient& daemon, const Task& task,
+                     std::ostream& out, std::ostream& log) {
+  const Result<std::optional<int>> channel = NamedChannel(args);
+  if (!channel) {
+    return LightEnded(tl::unexpected(channel.error()), log);
+  }
+  const LightRig rig = {
+      .change = [&](const BoardChange& change) { return ChangeBoardByDaemon(daemon, change); },
+      .all_off = [&] { return LightsOffByDaemon(daemon); },
+      .keep_on =
+          [&](const LightRequest& request, const auto& began) {
+            return KeepLightOnByDaemon(daemon, request, task, began);
+          }};
+  return LightEnded(Run(args, *channel, rig, out), log);
 }
 
 int RunLightOn(const LightArgs& args, std::unique_ptr<BytePort> port, const Task& task,
                std::ostream& out, std::ostream& log) {
-  LightBoard board(std::move(port));
-  const Status done = Run(args, board, task, out);
-  if (!done) {
-    log << "sateen light: error: " << done.error().message << '\n';
-    return ExitStatus(done.error());
+  // Before the port is opened, which restarts an Uno.
+  const Result<std::optional<int>> channel = NamedChannel(args);
+  if (!channel) {
+    return LightEnded(tl::unexpected(channel.error()), log);
   }
-  return 0;
+  LightBoard board(std::move(port));
+  if (const Status connected = board.Connect(); !connected) {
+    return LightEnded(connected, log);
+  }
+  const LightRig rig = {
+      .change = [&](const BoardChange& change) { return ChangeBoard(change, board); },
+      .all_off =
+          [&] {
+            const Result<BoardState> off = board.AllOff();
+            return off ? Status{} : tl::unexpected(off.error());
+          },
+      .keep_on = [&](const LightRequest& request,
+                     const auto& began) { return KeepLightOn(request, board, task, began); }};
+  return LightEnded(Run(args, *channel, rig, out), log);
 }
 
 }  // namespace sateen::cli

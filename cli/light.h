@@ -9,6 +9,7 @@
 
 #include "core/task.h"
 #include "scanner/byte_port.h"
+#include "scanner/daemon/http_client.h"
 
 namespace sateen::cli {
 
@@ -31,8 +32,11 @@ struct LightArgs {
 
 void AddLight(CLI::App& root, LightArgs& args);
 
-// Returns the exit status. The first opens the port that args name; tests give another.
+// Returns the exit status. The first asks the daemon where one is running and args name no port, else
+// it opens a port; tests give theirs.
 int RunLight(const LightArgs& args, const Task& task, std::ostream& out, std::ostream& log);
+int RunLightByDaemon(const LightArgs& args, const DaemonClient& daemon, const Task& task,
+                     std::ostream& out, std::ostream& log);
 int RunLightOn(const LightArgs& args, std::unique_ptr<BytePort> port, const Task& task,
                std::ostream& out, std::ostream& log);
 

@@ -15,6 +15,7 @@
 #include "cli/devices.h"
 #include "cli/light.h"
 #include "cli/preview.h"
+#include "cli/serve.h"
 #include "cli/session.h"
 #include "cli/simulate.h"
 #include "cli/solve.h"
@@ -50,6 +51,8 @@ int Run(int argc, char** argv) {
   sateen::cli::AddLight(app, light);
   sateen::cli::DevicesArgs devices;
   sateen::cli::AddDevices(app, devices);
+  sateen::cli::ServeArgs serve;
+  sateen::cli::AddServe(app, serve);
   sateen::cli::SessionArgs session;
   sateen::cli::AddSession(app, session);
   CLI::App* bench = app.add_subcommand("bench", "Measure speed against error on this machine");
@@ -89,6 +92,8 @@ int Run(int argc, char** argv) {
     status = RunLight(light, task, std::cout, std::cerr);
   } else if (app.got_subcommand("devices")) {
     status = RunDevices(devices, task, std::cout, std::cerr);
+  } else if (app.got_subcommand("serve")) {
+    status = RunServe(serve, task, std::cout, std::cerr);
   } else if (app.got_subcommand("session")) {
     status = RunSession(app, session, task, std::cout, std::cerr);
   } else if (bench->got_subcommand("simulate")) {

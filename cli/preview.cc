@@ -29,6 +29,19 @@ Result<PreviewRequest> PreviewRequestOf(const PreviewArgs& args) {
   return request.Validate().map([&] { return request; });
 }
 
+int ReportPreview(const PreviewArgs& args, const Result<Preview>& preview, std::ostream& out,
+                  std::ostream& log) {
+  if (!preview) {
+    log << "sateen preview: error: " << preview.error().message << '\n';
+    return ExitStatus(preview.error());
+  }
+  out << fmt::format("{}: {}x{} px, {}, f/{:g}, ISO {:g}; peak at {:.0f} % of what saturates\n",
+                     args.output.string(), preview->size_px.width, preview->size_px.height,
+                     ExposureText(preview->settings.exposure_s), preview->settings.f_number,
+                     preview->settings.iso, 100.0 * preview->levels.peak);
+  return 0;
+}
+
 }  // namespace
 
 void AddPreview(CLI::App& root, PreviewArgs& args) {
@@ -57,26 +70,32 @@ void AddPreview(CLI::App& root, PreviewArgs& args) {
 }
 
 int RunPreview(const PreviewArgs& args, const Task& task, std::ostream& out, std::ostream& log) {
+  const Result<std::optional<DaemonClient>> daemon = DaemonFor(args.devices);
+  if (!daemon || *daemon) {
+    const Result<PreviewRequest> request =
+        daemon ? PreviewRequestOf(args) : tl::unexpected(daemon.error());
+    return ReportPreview(args,
+                         request ? PreviewByDaemon(**daemon, *request, args.output)
+                                 : tl::unexpected(request.error()),
+                         out, log);
+  }
   RigDevices devices(args.devices);
   return RunPreviewWith(args, devices, task, out, log);
 }
 
 int RunPreviewWith(const PreviewArgs& args, RigDevices& devices, const Task& task,
                    std::ostream& out, std::ostream& log) {
-  const Result<PreviewRequest> request = PreviewRequestOf(args);
-  const Result<Preview> preview =
-      request ? TakePreview(*request, devices, task) : tl::unexpected(request.error());
-  const Status written =
-      preview ? WriteFileWhole(args.output, preview->jpeg) : tl::unexpected(preview.error());
-  if (!written) {
-    log << "sateen preview: error: " << written.error().message << '\n';
-    return ExitStatus(written.error());
-  }
-  out << fmt::format("{}: {}x{} px, {}, f/{:g}, ISO {:g}; peak at {:.0f} % of what saturates\n",
-                     args.output.string(), preview->size_px.width, preview->size_px.height,
-                     ExposureText(preview->settings.exposure_s), preview->settings.f_number,
-                     preview->settings.iso, 100.0 * preview->levels.peak);
-  return 0;
+  return ReportPreview(args,
+                       PreviewRequestOf(args)
+                           .and_then([&](const PreviewRequest& request) {
+                             return TakePreview(request, devices, task);
+                           })
+                           .and_then([&](Preview preview) {
+                             return WriteFileWhole(args.output, preview.jpeg).map([&] {
+                               return std::move(preview);
+                             });
+                           }),
+                       out, log);
 }
 
 }  // namespace sateen::cli

@@ -21,7 +21,7 @@ struct PreviewArgs {
 
 void AddPreview(CLI::App& root, PreviewArgs& args);
 
-// Returns the exit status.
+// Asks the daemon where one is running and args name no device. Returns the exit status.
 int RunPreview(const PreviewArgs& args, const Task& task, std::ostream& out, std::ostream& log);
 // The same on devices that a test gives.
 int RunPreviewWith(const PreviewArgs& args, RigDevices& devices, const Task& task,

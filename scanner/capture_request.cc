@@ -115,7 +115,11 @@ Result<CaptureSummary> RunCapture(const CaptureRequest& request, RigDevices& dev
   if (!open) {
     return tl::unexpected(open.error());
   }
-  return session->Run(*open->board, *open->camera, task, observer);
+  Result<CaptureSummary> summary = session->Run(*open->board, *open->camera, task, observer);
+  if (!summary) {
+    devices.CloseCamera();
+  }
+  return summary;
 }
 
 Result<CaptureForecast> ForecastCapture(const CaptureRequest& request, RigDevices& devices) {

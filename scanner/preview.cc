@@ -194,6 +194,7 @@ Result<Preview> TakePreview(const PreviewRequest& request, RigDevices& devices, 
   const Result<Shot> shot = request.exposure_s ? shooter.Take(*request.exposure_s, folder.Path())
                                                : shooter.Find(folder.Path());
   if (!shot) {
+    devices.CloseCamera();
     return tl::unexpected(shot.error());
   }
   const auto picture = Show(shot->mosaic, shot->reading, request.max_width);

@@ -57,6 +57,10 @@ void RigDevices::Release() noexcept {
   if (board_) {
     board_->Close();
   }
+  CloseCamera();
+}
+
+void RigDevices::CloseCamera() noexcept {
   if (camera_ && camera_info_) {
     camera_->Close();
     camera_info_.reset();

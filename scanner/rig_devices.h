@@ -34,6 +34,8 @@ class RigDevices {
   [[nodiscard]] Result<LightBoard*> Board();
   // Open; what was lost is opened anew. kDevice: none, or it cannot be used, and how to mend it.
   [[nodiscard]] Result<TetheredCamera*> Camera();
+  // So that Camera() opens it anew: after an error that may have been its own.
+  void CloseCamera() noexcept;
   // What the camera said when it was opened; nothing where it is not open.
   [[nodiscard]] const std::optional<CameraInfo>& OpenCamera() const { return camera_info_; }
 

@@ -130,6 +130,52 @@ TEST(RigProgram, AKilledHostLeavesNoLightOn) {
   EXPECT_LT(off["time_s"].get<double>() - rig.WaitFor("light")["time_s"].get<double>(), 10.0);
 }
 
+// Starts `sateen serve`, turns a light on through it, and ends the daemon with the signal.
+ShellResult EndDaemonWithALightOn(const RunningRig& rig, const std::filesystem::path& folder,
+                                  const std::string& signal) {
+  const std::string events = (folder / "events.jsonl").string();
+  const std::string socket = (folder / "s.sock").string();
+  WriteText(folder / "end.sh", "export SATEEN_SOCKET=" + socket + "\n" +  //
+                                   kSateen + " serve & daemon=$!\n" + "while ! test -S " + socket +
+                                   "; do sleep 0.05; done\n" + kSateen + " light 5 & light=$!\n" +
+                                   "while ! grep -q 'level.:0.5' " + events +
+                                   "; do sleep 0.05; done\n" + "kill -" + signal + " $daemon\n" +
+                                   "wait $light; echo light ended with $?\n" +
+                                   "wait $daemon; echo daemon ended with $?\n");
+  return Shell(rig.Environment() + "sh " + (folder / "end.sh").string());
+}
+
+TEST(RigProgram, ADaemonThatIsEndedTurnsItsLightOff) {
+  const TempFolder folder;
+  RunningRig rig(folder.Path());
+  const ShellResult ended = EndDaemonWithALightOn(rig, folder.Path(), "TERM");
+  EXPECT_THAT(ended.out, HasSubstr("cancelled by the end of the daemon"));
+  EXPECT_THAT(ended.out, HasSubstr("light ended with 6"));
+  EXPECT_THAT(ended.out, HasSubstr("all lights off; ended"));
+  EXPECT_THAT(ended.out, HasSubstr("daemon ended with 0"));
+  EXPECT_FALSE(std::filesystem::exists(folder.Path() / "s.sock"));
+  EXPECT_EQ(rig.WaitFor("light", 2)["level"], 0.0);
+}
+
+TEST(RigProgram, AKilledDaemonLeavesNoLightOnAndItsSocketIsReplaced) {
+  const TempFolder folder;
+  RunningRig rig(folder.Path());
+  const ShellResult ended = EndDaemonWithALightOn(rig, folder.Path(), "KILL");
+  EXPECT_THAT(ended.out, HasSubstr("is gone"));
+  EXPECT_THAT(ended.out, HasSubstr("light ended with 5"));
+  EXPECT_TRUE(std::filesystem::exists(folder.Path() / "s.sock"));
+  const json off = rig.WaitFor("light", 2);
+  EXPECT_EQ(off["level"], 0.0);
+  EXPECT_LT(off["time_s"].get<double>() - rig.WaitFor("light")["time_s"].get<double>(), 10.0);
+  // The stale socket is no daemon to a command, and none in the way of the next daemon.
+  const std::string at = "SATEEN_SOCKET=" + (folder.Path() / "s.sock").string() + " ";
+  EXPECT_EQ(Shell(rig.Environment() + at + kSateen + " light status").exit_status, 0);
+  const ShellResult next =
+      Shell(rig.Environment() + at + "sh -c '" + kSateen + " serve & sleep 1; kill $!; wait $!'");
+  EXPECT_EQ(next.exit_status, 0) << next.out;
+  EXPECT_THAT(next.out, HasSubstr("all lights off; ended"));
+}
+
 TEST(RigProgram, SaysWhatToPasteIntoAnotherShell) {
   const ShellResult result = Shell("echo quit | " + kRig);
   EXPECT_EQ(result.exit_status, 0);

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/error.h"
+#include "scanner/daemon/api.h"
+
+namespace sateen {
+
+// What of a request decides about whether it is let in. A header that is absent is none, one that is
+// there more than once is all of its values.
+struct AccessHeaders {
+  std::vector<std::string> host;
+  std::vector<std::string> authorization;
+  bool has_origin = false;
+};
+
+/// Who is let in over TCP, where any program and any web page of this computer can knock. (On the Unix
+/// socket the file's mode decides.)
+///
+///     Host     exactly one, localhost, 127.0.0.1 or [::1] with our port; else 421: a name that was
+///              made to point to this computer is not ours
+///     Origin   none; else 403: a web page asks
+///     Authorization   exactly one, "Bearer <token>"; else 401. Compared in a time that does not
+///              depend on where it differs
+class AccessRules {
+ public:
+  AccessRules(std::string token, int port);
+
+  // The refusal; nothing where the request is let in.
+  [[nodiscard]] std::optional<ApiResponse> Check(const AccessHeaders& headers) const;
+
+ private:
+  std::string token_;
+  int port_;
+};
+
+// Without looking at where they differ; their lengths are no secret.
+[[nodiscard]] bool SameInConstantTime(const std::string& a, const std::string& b);
+
+/// The token: the file's first line.
+///
+/// Errors  kIo: it cannot be read; kInvalidArgument: others than its owner may read or write it, it is
+///         not the user's own, or the token is not of 16 to 512 printable characters without spaces
+[[nodiscard]] Result<std::string> ReadTokenFile(const std::filesystem::path& path);
+
+}  // namespace sateen

@@ -1,0 +1,54 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/error.h"
+#include "scanner/capture_request.h"
+#include "scanner/daemon/board_job.h"
+#include "scanner/daemon/light_job.h"
+#include "scanner/daemon/rig_service.h"
+#include "scanner/preview.h"
+
+// What the daemon answers, as JSON and back; docs/api.md has the keys. Texts are one line.
+namespace sateen {
+
+[[nodiscard]] std::string StateJson(const RigState& state, const std::string& version);
+[[nodiscard]] std::string JobJson(const JobRecord& job);
+[[nodiscard]] std::string JobsJson(const std::vector<JobRecord>& jobs);
+// {"id": 7, "events": "/v1/jobs/7/events"}
+[[nodiscard]] std::string BegunJson(std::uint64_t id);
+[[nodiscard]] Result<std::uint64_t> BegunFromJson(const std::string& text);
+
+// {"error": {"code": "device", "message": ...}}, and the job that has the rig, where one has.
+[[nodiscard]] std::string ErrorJson(const Error& error,
+                                    const std::optional<JobRecord>& holder = std::nullopt);
+// The error that such a text tells of; another text is a kBadData itself.
+[[nodiscard]] Error ErrorFromJson(const std::string& text);
+// "invalid-argument", "bad-data", "degenerate", "io", "device", "timeout", "cancelled".
+[[nodiscard]] std::string_view Name(ErrorCode code);
+// "the rig is in use: capture of scans/twill by ... since 06:31:07 (job 7); ..."
+[[nodiscard]] std::string BusyText(const JobRecord& holder);
+
+[[nodiscard]] std::string EventJson(const CaptureEvent& event);
+[[nodiscard]] Result<CaptureEvent> CaptureEventFromJson(const std::string& text);
+// The session itself is on disk, in session.json.
+[[nodiscard]] std::string SummaryJson(const CaptureSummary& summary);
+// The session is not filled in.
+[[nodiscard]] Result<CaptureSummary> SummaryFromJson(const std::string& text);
+
+// Without the picture; where it was written, if it was.
+[[nodiscard]] std::string PreviewJson(const Preview& preview, const std::filesystem::path& output);
+[[nodiscard]] Result<Preview> PreviewAnswerFromJson(const std::string& text);
+
+[[nodiscard]] std::string LightOnJson(const LightOn& on);
+[[nodiscard]] Result<LightOn> LightOnFromJson(const std::string& text);
+
+[[nodiscard]] std::string BoardJson(const BoardWord& board);
+[[nodiscard]] Result<BoardWord> BoardFromJson(const std::string& text);
+
+}  // namespace sateen

@@ -1,0 +1,246 @@
+#include "scanner/daemon/api.h"
+
+#include <algorithm>
+#include <charconv>
+#include <utility>
+#include <vector>
+
+#include "scanner/daemon/answer_json.h"
+#include "scanner/daemon/api_json.h"
+#include "scanner/daemon/rig_jobs.h"
+
+namespace sateen {
+namespace {
+
+// A whole number without a sign; nothing for other text.
+template <typename T>
+std::optional<T> WholeNumber(const std::string& text) {
+  T number = 0;
+  const auto [rest, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  const bool whole = error == std::errc() && rest == text.data() + text.size() && number >= 0;
+  return whole ? std::optional(number) : std::nullopt;
+}
+
+// Who has a job: the name that a client gives itself, and what the transport knows of it.
+std::string OwnerName(const std::string& client, const std::string& who) {
+  return client.empty() ? who : fmt::format("{} ({})", client, who);
+}
+
+// Where `path` has the form of `pattern`, "/v1/jobs/{}": what stands in the place of {}.
+std::optional<std::string> Match(std::string_view pattern, std::string_view path) {
+  const std::size_t place = pattern.find("{}");
+  if (place == std::string_view::npos) {
+    return pattern == path ? std::optional<std::string>("") : std::nullopt;
+  }
+  const std::string_view before = pattern.substr(0, place);
+  const std::string_view after = pattern.substr(place + 2);
+  if (path.size() <= before.size() + after.size() || !path.starts_with(before) ||
+      !path.ends_with(after)) {
+    return std::nullopt;
+  }
+  const std::string_view value =
+      path.substr(before.size(), path.size() - before.size() - after.size());
+  return value.find('/') == std::string_view::npos ? std::optional<std::string>(value)
+                                                   : std::nullopt;
+}
+
+ApiResponse RefusedBusy(const JobRefusal& refusal) {
+  return {.status = refusal.holder ? 409 : 503, .body = ErrorJson(refusal.error, refusal.holder)};
+}
+
+ApiResponse Ended(const tl::expected<JobRecord, JobRefusal>& ended) {
+  if (!ended) {
+    return RefusedBusy(ended.error());
+  }
+  return ended->error ? Refused(HttpStatus(ended->error->code), *ended->error)
+                      : ApiResponse{.body = ended->result};
+}
+
+ApiResponse NoSuchJob(const std::string& id) {
+  return Refused(404, {ErrorCode::kInvalidArgument,
+                       fmt::format("there is no job '{}'; the latest are at GET /v1/jobs", id)});
+}
+
+}  // namespace
+
+struct Api::Route {
+  std::string_view method;
+  std::string_view pattern;
+  ApiResponse (Api::*handler)(const ApiRequest&, Parameter) const;
+};
+
+const std::vector<Api::Route>& Api::Routes() {
+  // The first that fits is taken.
+  static const std::vector<Route> routes = {{"GET", "/v1/state", &Api::GetState},
+                                            {"GET", "/v1/devices", &Api::GetDevices},
+                                            {"GET", "/v1/board", &Api::GetBoard},
+                                            {"POST", "/v1/board", &Api::PostBoard},
+                                            {"GET", "/v1/jobs", &Api::GetJobs},
+                                            {"POST", "/v1/jobs", &Api::PostJob},
+                                            {"GET", "/v1/jobs/{}", &Api::GetJob},
+                                            {"DELETE", "/v1/jobs/{}", &Api::DeleteJob},
+                                            {"GET", "/v1/jobs/{}/events", &Api::GetEvents},
+                                            {"POST", "/v1/preview", &Api::PostPreview},
+                                            {"POST", "/v1/lights/off", &Api::PostLightsOff},
+                                            {"POST", "/v1/lights/{}", &Api::PostLight}};
+  return routes;
+}
+
+ApiResponse Refused(int status, const Error& error) {
+  return {.status = status, .body = ErrorJson(error)};
+}
+
+int HttpStatus(ErrorCode code) {
+  switch (code) {
+    case ErrorCode::kInvalidArgument:
+      return 400;
+    case ErrorCode::kBadData:
+    case ErrorCode::kDegenerate:
+      return 422;
+    case ErrorCode::kIo:
+      return 500;
+    case ErrorCode::kTimeout:
+      return 504;
+    case ErrorCode::kDevice:
+    case ErrorCode::kCancelled:
+      return 503;
+  }
+  return 500;
+}
+
+Api::Api(RigService& service, ApiOptions options)
+    : service_(service), options_(std::move(options)) {}
+
+ApiResponse Api::Handle(const ApiRequest& request) const {
+  std::string allow;
+  for (const Route& route : Routes()) {
+    const std::optional<std::string> parameter = Match(route.pattern, request.path);
+    if (!parameter) {
+      continue;
+    }
+    if (request.method == route.method) {
+      return (this->*route.handler)(request, *parameter);
+    }
+    if (allow.find(route.method) == std::string::npos) {
+      allow += fmt::format("{}{}", allow.empty() ? "" : ", ", route.method);
+    }
+  }
+  if (allow.empty()) {
+    return Refused(404, {ErrorCode::kInvalidArgument,
+                         fmt::format("there is nothing at '{}'; docs/api.md lists what there is, "
+                                     "as GET /v1/state",
+                                     request.path)});
+  }
+  ApiResponse response = Refused(
+      405, {ErrorCode::kInvalidArgument,
+            fmt::format("{} is not for '{}'; need {}", request.method, request.path, allow)});
+  response.allow = allow;
+  return response;
+}
+
+ApiResponse Api::GetState(const ApiRequest& /*request*/, Parameter /*none*/) const {
+  return {.body = StateJson(service_.State(), options_.version)};
+}
+
+ApiResponse Api::GetDevices(const ApiRequest& request, Parameter /*none*/) const {
+  return RunToEnd(DevicesJob(request.who));
+}
+
+ApiResponse Api::GetBoard(const ApiRequest& request, Parameter /*none*/) const {
+  return RunToEnd(BoardJob({}, request.who));
+}
+
+ApiResponse Api::PostBoard(const ApiRequest& request, Parameter /*none*/) const {
+  const Result<PostedBoardChange> posted = BoardChangeFromJson(request.body);
+  return posted ? RunToEnd(BoardJob(posted->change, OwnerName(posted->client, request.who)))
+                : Refused(400, posted.error());
+}
+
+ApiResponse Api::GetJobs(const ApiRequest& /*request*/, Parameter /*none*/) const {
+  return {.body = JobsJson(service_.Jobs())};
+}
+
+ApiResponse Api::PostJob(const ApiRequest& request, Parameter /*none*/) const {
+  const Result<PostedCapture> posted = CaptureFromJson(request.body, options_.capture);
+  return posted ? Begin(CaptureJob(posted->request, OwnerName(posted->client, request.who)))
+                : Refused(400, posted.error());
+}
+
+ApiResponse Api::GetJob(const ApiRequest& /*request*/, Parameter id) const {
+  const std::optional<JobRecord> job = service_.Find(WholeNumber<std::uint64_t>(id).value_or(0));
+  return job ? ApiResponse{.body = JobJson(*job)} : NoSuchJob(id);
+}
+
+ApiResponse Api::DeleteJob(const ApiRequest& request, Parameter id) const {
+  const std::uint64_t number = WholeNumber<std::uint64_t>(id).value_or(0);
+  if (!service_.Cancel(number, request.who)) {
+    return NoSuchJob(id);
+  }
+  const std::optional<JobRecord> job = service_.Find(number);
+  return job ? ApiResponse{.status = job->state == JobState::kRunning ? 202 : 200,
+                           .body = JobJson(*job)}
+             : NoSuchJob(id);
+}
+
+ApiResponse Api::GetEvents(const ApiRequest& request, Parameter id) const {
+  const std::optional<JobRecord> job = service_.Find(WholeNumber<std::uint64_t>(id).value_or(0));
+  if (!job) {
+    return NoSuchJob(id);
+  }
+  return {.events =
+              ApiResponse::Events{.job = job->id, .after = request.last_event_id.value_or(0)}};
+}
+
+// Safety: never refused for a job that runs; it is cancelled, and so is one that gets in between.
+ApiResponse Api::PostLightsOff(const ApiRequest& request, Parameter /*none*/) const {
+  const auto deadline = std::chrono::steady_clock::now() + options_.off_wait;
+  while (true) {
+    const tl::expected<JobRecord, JobRefusal> ended = service_.RunToEnd(LightsOffJob(request.who));
+    if (ended || !ended.error().holder) {
+      return Ended(ended);
+    }
+    const JobRecord& holder = *ended.error().holder;
+    service_.Cancel(holder.id, request.who);
+    const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(
+        deadline - std::chrono::steady_clock::now());
+    if (left.count() <= 0 || !service_.WaitIdle(left)) {
+      return {.status = 202, .body = JobJson(service_.Find(holder.id).value_or(holder))};
+    }
+  }
+}
+
+ApiResponse Api::PostPreview(const ApiRequest& request, Parameter /*none*/) const {
+  const Result<PostedPreview> posted = PreviewFromJson(request.body);
+  if (!posted) {
+    return Refused(400, posted.error());
+  }
+  const auto jpeg = std::make_shared<std::string>();
+  ApiResponse response = RunToEnd(
+      PreviewJob(posted->request, posted->output, jpeg, OwnerName(posted->client, request.who)));
+  if (!jpeg->empty()) {
+    response.body = std::move(*jpeg);
+    response.content_type = "image/jpeg";
+  }
+  return response;
+}
+
+ApiResponse Api::PostLight(const ApiRequest& request, Parameter channel) const {
+  const std::optional<int> number = WholeNumber<int>(channel);
+  if (!number) {
+    return Refused(404,
+                   {ErrorCode::kInvalidArgument,
+                    fmt::format("'{}' is no number of a light; need 0, 1, ... or off", channel)});
+  }
+  const Result<PostedLight> posted = LightFromJson(request.body, *number);
+  return posted ? Begin(LightJob(posted->request, OwnerName(posted->client, request.who)))
+                : Refused(400, posted.error());
+}
+
+ApiResponse Api::Begin(JobRequest job) const {
+  const tl::expected<std::uint64_t, JobRefusal> id = service_.Begin(std::move(job));
+  return id ? ApiResponse{.status = 202, .body = BegunJson(*id)} : RefusedBusy(id.error());
+}
+
+ApiResponse Api::RunToEnd(JobRequest job) const { return Ended(service_.RunToEnd(std::move(job))); }
+
+}  // namespace sateen

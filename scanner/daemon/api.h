@@ -1,0 +1,80 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "scanner/capture_options.h"
+#include "scanner/daemon/rig_service.h"
+
+namespace sateen {
+
+// A request that was let in, without its transport.
+struct ApiRequest {
+  std::string method;
+  std::string path;  // decoded, without a query
+  std::string body;
+  std::string who;                             // as the transport knows the client
+  std::optional<std::uint64_t> last_event_id;  // of Last-Event-ID
+};
+
+struct ApiResponse {
+  // What the transport sends instead of a body: the events of a job as they come.
+  struct Events {
+    std::uint64_t job = 0;
+    std::uint64_t after = 0;
+  };
+
+  int status = 200;
+  std::string body;
+  std::string content_type = "application/json";
+  std::string allow;  // methods of the path, of a 405
+  std::optional<Events> events;
+};
+
+// The answer to a refused request: the status, and an error in JSON.
+[[nodiscard]] ApiResponse Refused(int status, const Error& error);
+// 400, 422, 500, 503 or 504.
+[[nodiscard]] int HttpStatus(ErrorCode code);
+
+struct ApiOptions {
+  std::string version;
+  CaptureOptions capture;  // of a capture, what its request does not say
+  // How long turning the lights off waits for the job that it has cancelled.
+  std::chrono::milliseconds off_wait{10'000};
+};
+
+/// The daemon's interface, version 1, as a function of a request: docs/api.md. Calls may come from any
+/// thread; those that ask a device wait for it.
+class Api {
+ public:
+  Api(RigService& service, ApiOptions options);
+
+  [[nodiscard]] ApiResponse Handle(const ApiRequest& request) const;
+
+ private:
+  struct Route;
+  static const std::vector<Route>& Routes();
+  using Parameter = const std::string&;  // what stands in a route's place {}
+
+  [[nodiscard]] ApiResponse GetState(const ApiRequest& request, Parameter none) const;
+  [[nodiscard]] ApiResponse GetDevices(const ApiRequest& request, Parameter none) const;
+  [[nodiscard]] ApiResponse GetBoard(const ApiRequest& request, Parameter none) const;
+  [[nodiscard]] ApiResponse PostBoard(const ApiRequest& request, Parameter none) const;
+  [[nodiscard]] ApiResponse GetJobs(const ApiRequest& request, Parameter none) const;
+  [[nodiscard]] ApiResponse PostJob(const ApiRequest& request, Parameter none) const;
+  [[nodiscard]] ApiResponse GetJob(const ApiRequest& request, Parameter id) const;
+  [[nodiscard]] ApiResponse DeleteJob(const ApiRequest& request, Parameter id) const;
+  [[nodiscard]] ApiResponse GetEvents(const ApiRequest& request, Parameter id) const;
+  [[nodiscard]] ApiResponse PostLightsOff(const ApiRequest& request, Parameter none) const;
+  [[nodiscard]] ApiResponse PostPreview(const ApiRequest& request, Parameter none) const;
+  [[nodiscard]] ApiResponse PostLight(const ApiRequest& request, Parameter channel) const;
+
+  [[nodiscard]] ApiResponse Begin(JobRequest job) const;     // 202, or 409
+  [[nodiscard]] ApiResponse RunToEnd(JobRequest job) const;  // 200, 409, or the job's error
+
+  RigService& service_;
+  ApiOptions options_;
+};
+
+}  // namespace sateen

@@ -1,0 +1,36 @@
+#pragma once
+
+#include <chrono>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/error.h"
+#include "scanner/light_board.h"
+
+namespace sateen {
+
+// What a board says about itself when it is asked.
+struct BoardWord {
+  std::string port;
+  BoardInfo info;
+  BoardReport report;
+};
+
+// What of a board's settings shall change; what is absent stays. All of it turns all lights off.
+struct BoardChange {
+  bool clear_fault = false;
+  std::optional<int> channel;  // of max_level and max_on; absent: all
+  std::optional<double> max_level;
+  std::optional<std::chrono::milliseconds> max_on;
+  std::optional<int> max_lit;
+  std::optional<int> dim_clock;
+  std::optional<bool> sync_rising;
+};
+
+/// Makes the changes, one after the other, and asks the board.
+///
+/// Errors  as LightBoard; what was changed before the error stays changed
+[[nodiscard]] Result<BoardWord> ChangeBoard(const BoardChange& change, LightBoard& board);
+
+}  // namespace sateen

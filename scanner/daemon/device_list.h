@@ -1,0 +1,41 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "core/error.h"
+#include "scanner/find_camera.h"
+#include "scanner/light_board.h"
+#include "scanner/serial_port.h"
+#include "scanner/tethered_camera.h"
+
+namespace sateen {
+
+// A serial port or a camera, and what it said when it was asked.
+struct DeviceReply {
+  std::string port;
+  std::string usb;  // of a serial port: "2341:0043"; empty: not on USB
+  std::string description;
+  std::string serial;  // of a serial port
+  bool is_camera = false;
+  bool answers = false;  // it is an LED board, or a camera that is ready
+  std::string what;      // what it said, or why it is taken for none
+  // Of an LED board that answers.
+  std::string firmware;
+  std::string protocol;
+  int lights = 0;
+  // Of a camera that is ready.
+  std::string model;
+  std::string profile;
+};
+
+[[nodiscard]] DeviceReply ReplyOf(const SerialPortInfo& port);
+[[nodiscard]] DeviceReply ReplyOf(const UsbCamera& camera);
+void TakeBoard(DeviceReply& reply, const BoardInfo& info);
+void TakeCamera(DeviceReply& reply, const CameraInfo& info);
+
+// The object of `sateen devices --json` (docs/formats.md), and back. An indent below 0: one line.
+[[nodiscard]] std::string DevicesJson(const std::vector<DeviceReply>& devices, int indent);
+[[nodiscard]] Result<std::vector<DeviceReply>> DevicesFromJson(const std::string& text);
+
+}  // namespace sateen

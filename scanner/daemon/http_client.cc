@@ -1,0 +1,300 @@
+#include "scanner/daemon/http_client.h"
+
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <cerrno>
+#include <chrono>
+#include <cstdlib>
+#include <cstring>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "scanner/daemon/answer_json.h"
+#include "scanner/daemon/api_json.h"
+#include "scanner/daemon/event_parser.h"
+#include "scanner/daemon/httplib.h"
+#include "scanner/daemon/listener.h"
+
+namespace sateen {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+
+// Longest wait for an answer: a camera that is opened takes its time.
+constexpr seconds kPatience{120};
+// For the first word of a daemon that is there.
+constexpr seconds kGreeting{5};
+// Of a stream of events, whose daemon says every 5 s that it is there.
+constexpr seconds kSilence{30};
+// How soon Ctrl-C is heard.
+constexpr milliseconds kStep{20};
+// How often a stream that breaks off is taken up again without having brought anything new.
+constexpr int kResumes = 5;
+
+// cpp-httplib's client on a Unix socket.
+struct UnixClient : httplib::ClientImpl {
+  UnixClient(const std::filesystem::path& socket, seconds patience)
+      : ClientImpl(socket.string(), /*port=*/80) {
+    set_address_family(AF_UNIX);
+    set_connection_timeout(kGreeting);
+    set_read_timeout(patience);
+    set_write_timeout(patience);
+  }
+};
+
+Error NoAnswer(const std::filesystem::path& socket, httplib::Error error) {
+  const bool slow = error == httplib::Error::Read;
+  return {slow ? ErrorCode::kTimeout : ErrorCode::kDevice,
+          fmt::format("the daemon at {} {}: {}; start it again, or end it to work without one",
+                      socket.string(), slow ? "does not answer" : "is gone",
+                      httplib::to_string(error))};
+}
+
+Result<std::string> AskWithin(const std::filesystem::path& socket, seconds patience,
+                              const std::string& method, const std::string& path,
+                              const std::string& body) {
+  UnixClient http(socket, patience);
+  httplib::Request request;
+  request.method = method;
+  request.path = path;
+  request.headers = {{"Host", "localhost"}};
+  if (method != "GET") {
+    request.headers.emplace("Content-Type", "application/json");
+    request.body = body;
+  }
+  const httplib::Result answer = http.send(request);
+  if (!answer) {
+    return tl::unexpected(NoAnswer(socket, answer.error()));
+  }
+  return answer->status < 300 ? Result<std::string>(answer->body)
+                              : tl::unexpected(ErrorFromJson(answer->body));
+}
+
+// Follows a job to its end, in a thread of its own, so that a cancelled task is heard meanwhile.
+class Follower {
+ public:
+  Follower(std::filesystem::path socket, std::uint64_t job,
+           const std::function<void(const JobEvent&)>& observer)
+      : socket_(std::move(socket)), job_(job), observer_(observer), thread_([this] { Follow(); }) {}
+  Follower(const Follower&) = delete;
+  Follower& operator=(const Follower&) = delete;
+  ~Follower() { thread_.join(); }
+
+  [[nodiscard]] bool Ended() const { return ended_; }
+  // Once it has ended.
+  [[nodiscard]] const Result<std::string>& Outcome() const { return outcome_; }
+
+ private:
+  void Take(const JobEvent& event) {
+    last_event_ = event.sequence;
+    if (event.type == "done") {
+      outcome_ = event.data;
+      complete_ = true;
+    } else if (event.type == "failed") {
+      outcome_ = tl::unexpected(ErrorFromJson(event.data));
+      complete_ = true;
+    } else if (observer_) {
+      observer_(event);
+    }
+  }
+
+  void Follow() {
+    for (int resumes = 0; !complete_ && resumes < kResumes; ++resumes) {
+      const std::uint64_t before = last_event_;
+      if (!FollowOnce()) {
+        break;
+      }
+      resumes = last_event_ > before ? 0 : resumes;
+    }
+    ended_ = true;
+  }
+
+  // False where the daemon refuses, or nobody is there any more.
+  bool FollowOnce() {
+    UnixClient http(socket_, kSilence);
+    const httplib::Headers headers = {{"Host", "localhost"},
+                                      {"Last-Event-ID", std::to_string(last_event_)}};
+    EventParser parser([this](const JobEvent& event) { Take(event); });
+    int status = 0;
+    std::string refusal;
+    const httplib::Result answer = http.Get(
+        fmt::format("/v1/jobs/{}/events", job_), headers,
+        [&](const httplib::Response& response) {
+          status = response.status;
+          return true;
+        },
+        [&](const char* data, std::size_t size) {
+          if (status == 200) {
+            parser.Add({data, size});
+          } else {
+            refusal.append(data, size);
+          }
+          return true;
+        });
+    if (complete_) {
+      return true;
+    }
+    if (status != 0 && status != 200) {
+      outcome_ = tl::unexpected(ErrorFromJson(refusal));
+      return false;
+    }
+    outcome_ =
+        tl::unexpected(NoAnswer(socket_, answer ? httplib::Error::Connection : answer.error()));
+    return status == 200;  // broken off: to be taken up again
+  }
+
+  const std::filesystem::path socket_;
+  const std::uint64_t job_;
+  const std::function<void(const JobEvent&)>& observer_;
+  std::uint64_t last_event_ = 0;
+  bool complete_ = false;
+  Result<std::string> outcome_;
+  std::atomic<bool> ended_ = false;
+  std::thread thread_;  // last, as it uses the others
+};
+
+// Whether somebody accepts connections there, and lets this user in.
+bool Accepts(const std::filesystem::path& path) {
+  sockaddr_un address = {.sun_family = AF_UNIX};
+  if (path.native().size() >= sizeof address.sun_path) {
+    return false;
+  }
+  std::memcpy(address.sun_path, path.c_str(), path.native().size() + 1);
+  const int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  const bool connected =
+      fd >= 0 &&
+      connect(fd, static_cast<sockaddr*>(static_cast<void*>(&address)), sizeof address) == 0;
+  if (fd >= 0) {
+    close(fd);
+  }
+  return connected;
+}
+
+std::filesystem::path Absolute(const std::filesystem::path& path) {
+  return path.empty() ? path : std::filesystem::absolute(path).lexically_normal();
+}
+
+}  // namespace
+
+DaemonClient::DaemonClient(std::filesystem::path socket) : socket_(std::move(socket)) {}
+
+Result<std::string> DaemonClient::Ask(const std::string& method, const std::string& path,
+                                      const std::string& body) const {
+  return AskWithin(socket_, kPatience, method, path, body);
+}
+
+Result<std::string> DaemonClient::RunJob(const std::string& path, const std::string& body,
+                                         const std::function<void(const JobEvent&)>& observer,
+                                         const Task& task) const {
+  const Result<std::string> posted = Ask("POST", path, body);
+  if (!posted) {
+    return posted;
+  }
+  const Result<std::uint64_t> id = BegunFromJson(*posted);
+  if (!id) {
+    return tl::unexpected(id.error());
+  }
+  const Follower follower(socket_, *id, observer);
+  for (bool cancelled = false; !follower.Ended(); std::this_thread::sleep_for(kStep)) {
+    if (task.Cancelled() && !cancelled) {
+      cancelled = true;
+      // The end of the job tells how it went; without an end there is no daemon to be told.
+      [[maybe_unused]] const auto ignored = Ask("DELETE", fmt::format("/v1/jobs/{}", *id));
+    }
+  }
+  return follower.Outcome();
+}
+
+Result<std::optional<DaemonClient>> FindDaemon() {
+  const char* const named = std::getenv("SATEEN_SOCKET");
+  const std::vector<std::filesystem::path> places =
+      named != nullptr
+          ? std::vector<std::filesystem::path>{named}
+          : std::vector<std::filesystem::path>{DefaultSocketPath(), "/run/sateen/sateen.sock"};
+  for (const std::filesystem::path& place : places) {
+    if (place.empty() || !Accepts(place)) {
+      continue;
+    }
+    if (const auto state = AskWithin(place, kGreeting, "GET", "/v1/state", ""); !state) {
+      return tl::unexpected(state.error());
+    }
+    return std::optional<DaemonClient>(DaemonClient(place));
+  }
+  return std::optional<DaemonClient>();
+}
+
+Result<CaptureSummary> CaptureByDaemon(const DaemonClient& daemon, const CaptureRequest& request,
+                                       const Task& task, const CaptureObserver& observer) {
+  CaptureRequest absolute = request;
+  absolute.rig = Absolute(request.rig);
+  absolute.output = Absolute(request.output);
+  const auto observe = [&](const JobEvent& event) {
+    if (const Result<CaptureEvent> capture = CaptureEventFromJson(event.data);
+        capture && observer) {
+      observer(*capture);
+    }
+  };
+  const Result<std::string> result =
+      daemon.RunJob("/v1/jobs", CaptureToJson(absolute, ""), observe, task);
+  if (!result) {
+    return tl::unexpected(result.error());
+  }
+  Result<CaptureSummary> summary = SummaryFromJson(*result);
+  const Result<Session> session = ReadSessionRecord(absolute.output);
+  if (summary && !session) {
+    return tl::unexpected(session.error());
+  }
+  if (summary) {
+    summary->session = *session;
+  }
+  return summary;
+}
+
+Result<Preview> PreviewByDaemon(const DaemonClient& daemon, const PreviewRequest& request,
+                                const std::filesystem::path& output) {
+  PreviewRequest absolute = request;
+  absolute.rig = Absolute(request.rig);
+  return daemon.Ask("POST", "/v1/preview", PreviewToJson(absolute, Absolute(output), ""))
+      .and_then(PreviewAnswerFromJson);
+}
+
+Result<bool> KeepLightOnByDaemon(const DaemonClient& daemon, const LightRequest& request,
+                                 const Task& task,
+                                 const std::function<void(const LightOn&)>& began) {
+  const auto observe = [&](const JobEvent& event) {
+    if (const Result<LightOn> on = LightOnFromJson(event.data)) {
+      began(*on);
+    }
+  };
+  const Result<std::string> result = daemon.RunJob(fmt::format("/v1/lights/{}", request.channel),
+                                                   LightToJson(request, ""), observe, task);
+  if (result) {
+    return false;
+  }
+  // Cancelled by this program's own Ctrl-C, it has ended as it was asked to.
+  return result.error().code == ErrorCode::kCancelled && task.Cancelled()
+             ? Result<bool>(true)
+             : tl::unexpected(result.error());
+}
+
+Result<BoardWord> ChangeBoardByDaemon(const DaemonClient& daemon, const BoardChange& change) {
+  const Result<std::string> word = daemon.Ask("POST", "/v1/board", BoardChangeToJson(change, ""));
+  return word ? BoardFromJson(*word) : tl::unexpected(word.error());
+}
+
+Status LightsOffByDaemon(const DaemonClient& daemon) {
+  const Result<std::string> off = daemon.Ask("POST", "/v1/lights/off");
+  return off ? Status{} : tl::unexpected(off.error());
+}
+
+Result<std::vector<DeviceReply>> DevicesByDaemon(const DaemonClient& daemon) {
+  const Result<std::string> devices = daemon.Ask("GET", "/v1/devices");
+  return devices ? DevicesFromJson(*devices) : tl::unexpected(devices.error());
+}
+
+}  // namespace sateen

@@ -1,0 +1,70 @@
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <string>
+
+#include "core/error.h"
+#include "core/task.h"
+#include "scanner/capture_request.h"
+#include "scanner/daemon/board_job.h"
+#include "scanner/daemon/device_list.h"
+#include "scanner/daemon/job.h"
+#include "scanner/daemon/light_job.h"
+#include "scanner/preview.h"
+
+namespace sateen {
+
+/// The daemon at the other end of a Unix socket. Each call is a connection of its own.
+///
+/// Errors  what the daemon answers, with its code and message, so that a caller ends with the same exit
+///         status as without a daemon; kDevice: another job has the rig (who, and since when), or the
+///         daemon has gone; kTimeout: it does not answer
+class DaemonClient {
+ public:
+  explicit DaemonClient(std::filesystem::path socket);
+
+  // The answer's body.
+  [[nodiscard]] Result<std::string> Ask(const std::string& method, const std::string& path,
+                                        const std::string& body = "") const;
+
+  // Posts the job, tells `observer` of its progress, cancels it when the task is cancelled, and waits
+  // for its end; its result.
+  [[nodiscard]] Result<std::string> RunJob(const std::string& path, const std::string& body,
+                                           const std::function<void(const JobEvent&)>& observer,
+                                           const Task& task) const;
+
+  [[nodiscard]] const std::filesystem::path& Socket() const { return socket_; }
+
+ private:
+  std::filesystem::path socket_;
+};
+
+/// The daemon that is running, if one is: at $SATEEN_SOCKET where that is set, and where it is empty
+/// none; else at $XDG_RUNTIME_DIR/sateen.sock, else at /run/sateen/sateen.sock. A socket at which nobody
+/// answers, or to which the user may not connect, is no daemon.
+///
+/// Errors  kTimeout, kBadData: something answers there, but not as a daemon does
+[[nodiscard]] Result<std::optional<DaemonClient>> FindDaemon();
+
+// RunCapture by the daemon; paths are made absolute. Of the summary the session is the one on disk.
+[[nodiscard]] Result<CaptureSummary> CaptureByDaemon(const DaemonClient& daemon,
+                                                     const CaptureRequest& request,
+                                                     const Task& task,
+                                                     const CaptureObserver& observer = {});
+// TakePreview by the daemon, into the file `output`; the answer has no picture.
+[[nodiscard]] Result<Preview> PreviewByDaemon(const DaemonClient& daemon,
+                                              const PreviewRequest& request,
+                                              const std::filesystem::path& output);
+// KeepLightOn by the daemon. kCancelled: somebody else turned it off.
+[[nodiscard]] Result<bool> KeepLightOnByDaemon(const DaemonClient& daemon,
+                                               const LightRequest& request, const Task& task,
+                                               const std::function<void(const LightOn&)>& began);
+[[nodiscard]] Result<BoardWord> ChangeBoardByDaemon(const DaemonClient& daemon,
+                                                    const BoardChange& change);
+// Also when a job runs, which it cancels.
+[[nodiscard]] Status LightsOffByDaemon(const DaemonClient& daemon);
+[[nodiscard]] Result<std::vector<DeviceReply>> DevicesByDaemon(const DaemonClient& daemon);
+
+}  // namespace sateen

@@ -1,0 +1,51 @@
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <memory>
+#include <optional>
+
+#include "core/error.h"
+#include "scanner/daemon/access.h"
+#include "scanner/daemon/api.h"
+#include "scanner/daemon/listener.h"
+#include "scanner/daemon/rig_service.h"
+
+namespace sateen {
+
+struct HttpServerOptions {
+  // The whole request must have come within this time, and the client must take the answer's next
+  // piece within it.
+  std::chrono::milliseconds client_time{10'000};
+  // How often a stream of events says that it is still there.
+  std::chrono::milliseconds heartbeat{5000};
+  std::size_t max_body_bytes = 64 * 1024;
+  int max_connections = 64;  // each has a thread; the next one is told 503
+  int max_streams = 16;      // of them, those that follow events
+};
+
+/// The API over HTTP/1.1 on one listener, one request a connection. cpp-httplib parses requests and
+/// writes answers; sockets, deadlines and limits are here, since its own server (0.11) waits for slow
+/// clients without an end and takes any number of connections.
+///
+/// 400 no HTTP, no length that is one, 401, 403, 421 (AccessRules), 408 too slow, 411 a body without
+/// Content-Length, 413 too long a body, 415 a body that is no application/json, 503 too many clients;
+/// everything else is the Api's answer.
+class HttpServer {
+ public:
+  // Without `access` everybody who can connect is let in. `api` and `service` must outlive the server.
+  HttpServer(Listener listener, const Api& api, const RigService& service,
+             std::optional<AccessRules> access, const HttpServerOptions& options = {});
+  HttpServer(const HttpServer&) = delete;
+  HttpServer& operator=(const HttpServer&) = delete;
+  // Takes no more connections, gives those that are open a second to end, and ends them.
+  ~HttpServer();
+
+  [[nodiscard]] const Listener& GetListener() const;
+
+ private:
+  class Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace sateen

@@ -1,0 +1,61 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/error.h"
+#include "core/task.h"
+#include "scanner/rig_devices.h"
+
+namespace sateen {
+
+// What happened to a job, in its order. A job ends with one "done" or one "failed".
+struct JobEvent {
+  std::uint64_t sequence = 0;  // from 1, without gaps
+  std::string type;            // "progress", "done", "failed"
+  std::string data;            // one line of JSON
+};
+
+enum class JobState { kRunning, kDone, kFailed };
+
+// Who asks for something, in words that tell another person whom to talk to.
+struct JobRecord {
+  std::uint64_t id = 0;
+  std::string kind;   // "capture", "light", "devices", "board", "lights off"
+  std::string what;   // the folder of a capture, the light
+  std::string owner;  // who asked: "process 4711 (sateen) of alice"
+  std::chrono::system_clock::time_point since;
+  std::optional<std::chrono::system_clock::time_point> ended;
+  JobState state = JobState::kRunning;
+  std::string result;          // JSON, of a job that is done
+  std::optional<Error> error;  // of one that failed; kCancelled: somebody cancelled it
+  std::uint64_t last_event = 0;
+};
+
+// What a job works with. Its calls come from the job's own thread.
+class JobContext {
+ public:
+  virtual ~JobContext() = default;
+  [[nodiscard]] virtual RigDevices& Devices() = 0;
+  [[nodiscard]] virtual const Task& GetTask() const = 0;
+  // `json` is one line; those who follow the job get it.
+  virtual void Report(std::string json) = 0;
+  // Before a light goes on: the channels that may be on from now on.
+  virtual void Lit(std::vector<int> channels) = 0;
+};
+
+// Does the job and returns its result as JSON. It stops with kCancelled soon after the task's flag is set.
+using JobWork = std::function<Result<std::string>(JobContext&)>;
+
+struct JobRequest {
+  std::string kind;
+  std::string what;
+  std::string owner;
+  JobWork work;
+};
+
+}  // namespace sateen

@@ -1,0 +1,126 @@
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <deque>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "core/error.h"
+#include "scanner/daemon/job.h"
+#include "scanner/light_board.h"
+#include "scanner/rig_devices.h"
+
+namespace sateen {
+
+// Why a job was not begun.
+struct JobRefusal {
+  Error error;
+  std::optional<JobRecord> holder;  // the job that has the rig; absent where the daemon is ending
+};
+
+// The board as it last said it.
+struct KnownBoard {
+  std::string port;
+  std::string firmware;
+  std::string protocol;
+  int lights = 0;
+};
+
+struct RigState {
+  std::optional<KnownBoard> board;
+  std::optional<CameraInfo> camera;
+  std::optional<JobRecord> job;       // the one that runs
+  std::optional<JobRecord> last_job;  // the latest that has ended
+  std::vector<int> lit;               // channels that may be on; none where no job runs
+  std::string lights_fault;           // why the board's word that all is off is missing; else empty
+};
+
+struct FollowedEvents {
+  std::vector<JobEvent> events;
+  bool ended = false;  // no more will come
+};
+
+/// Owns the rig: one job at a time has it, in a thread of this service.
+///
+///     state      what leads out of it
+///     idle       Begin: the job's work runs                                    -> running
+///     running    the work returns, throws, or was cancelled and returns        -> ending
+///     ending     the board has said that all lights are off, or cannot be
+///                reached twice, which takes longer than its 2 s of silence     -> idle
+///
+/// A job counts as running until its lights are off, so that no light is ever on while the state says
+/// that no job runs. Begin while a job runs is refused at once with who has the rig since when; there
+/// is no queue. All calls may come from any thread.
+///
+/// Of each job the latest 1000 events are kept, and of ended jobs the latest 20.
+class RigService {
+ public:
+  explicit RigService(std::unique_ptr<RigDevices> devices);
+  RigService(const RigService&) = delete;
+  RigService& operator=(const RigService&) = delete;
+  ~RigService();  // Stop()
+
+  // The job's number.
+  [[nodiscard]] tl::expected<std::uint64_t, JobRefusal> Begin(JobRequest request);
+  // Begins it and waits for its end.
+  [[nodiscard]] tl::expected<JobRecord, JobRefusal> RunToEnd(JobRequest request);
+
+  [[nodiscard]] RigState State() const;
+  [[nodiscard]] std::vector<JobRecord> Jobs() const;
+  [[nodiscard]] std::optional<JobRecord> Find(std::uint64_t id) const;
+
+  // The events after the one numbered `after`, at once if there are any, else when one comes or
+  // `longest` has passed. Nothing for a job that is not known.
+  [[nodiscard]] std::optional<FollowedEvents> Follow(std::uint64_t id, std::uint64_t after,
+                                                     std::chrono::milliseconds longest) const;
+
+  // Tells the job to stop; it has ended when its last event says so. False: not known.
+  bool Cancel(std::uint64_t id, const std::string& who);
+  // Waits until no job runs; false where one still does after `longest`.
+  bool WaitIdle(std::chrono::milliseconds longest) const;
+
+  // Refuses new jobs, cancels the running one, waits for its end, turns all lights off and closes the
+  // devices. The second time it does nothing.
+  void Stop();
+
+ private:
+  struct Job {
+    JobRecord record;
+    JobWork work;
+    std::deque<JobEvent> events;
+    std::atomic<bool> cancel = false;
+    std::string cancelled_by;
+  };
+  class Context;
+
+  void RunJobs();
+  [[nodiscard]] Result<std::string> Work(Job& job);
+  // The board's word that all is off; what is wrong where it cannot be had.
+  [[nodiscard]] std::string ConfirmLightsOff();
+  void End(Job& job, Result<std::string> result, std::string lights_fault);
+  void Append(Job& job, std::string type, std::string data);  // with the mutex held
+  [[nodiscard]] Job* Known(std::uint64_t id) const;           // with the mutex held
+
+  std::unique_ptr<RigDevices> devices_;  // of the job thread alone
+  bool board_was_asked_ = false;         // of the job thread alone
+
+  mutable std::mutex mutex_;  // for all below
+  mutable std::condition_variable changed_;
+  std::deque<std::unique_ptr<Job>> jobs_;  // the latest last
+  Job* running_ = nullptr;
+  std::uint64_t next_id_ = 1;
+  std::optional<KnownBoard> board_;
+  std::optional<CameraInfo> camera_;
+  std::vector<int> lit_;
+  std::string lights_fault_;
+  bool stopping_ = false;
+  std::thread thread_;
+};
+
+}  // namespace sateen
