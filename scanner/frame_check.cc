@@ -5,6 +5,8 @@
 #include <nlohmann/json.hpp>
 #include <numeric>
 
+#include "scanner/frame_compare.h"
+
 namespace sateen {
 namespace {
 
@@ -60,9 +62,15 @@ class CaptureChecker {
     if (!check_.faults.empty()) {
       return std::move(check_);  // what every frame suffers from would look like faults of lights
     }
-    CheckLevels();
+    FindDark();
     CheckPatterns();
-    CheckShift();
+    if (check_.faults.empty()) {
+      CheckShifts();
+    }
+    if (check_.faults.empty()) {
+      CheckShades();
+    }
+    CheckLevels();
     if (check_.faults.empty() && std::abs(check_.drift) > options_.max_drift) {
       check_.notes.push_back(fmt::format(
           "light '{}' is {:+.1f} % brighter at the end than at the start; let the lights warm up",
@@ -125,30 +133,21 @@ class CaptureChecker {
     }
   }
 
-  // A first light that is not what it should be cannot be laid over its repeat.
-  void CheckShift() {
-    const bool first_is_wrong = std::ranges::any_of(check_.faults, [](const CaptureFault& fault) {
-      return std::ranges::find(fault.lights, std::size_t{0}) != fault.lights.end();
-    });
-    if (first_is_wrong) {
-      return;
-    }
-    const Shift shift = ShiftBetween(looks_.lit[0]->middle, looks_.repeat->middle);
-    if (shift.peak < options_.min_shift_peak) {
+  void CheckShifts() {
+    check_.shifts = ShiftsOf(rig_, looks_, on_, options_);
+    if (check_.shifts.empty()) {
       check_.notes.emplace_back(
           "too little texture to tell whether the camera has moved meanwhile");
-      return;
+    } else if (std::optional<CaptureFault> moved = MovedFault(rig_, check_.shifts, options_)) {
+      check_.faults.push_back(*std::move(moved));
     }
-    check_.shift = shift;
-    if (shift.px.norm() > options_.max_shift_px) {
-      check_.faults.push_back(
-          {.kind = CaptureFaultKind::kMoved,
-           .text = fmt::format(
-               "the picture has moved by {:.1f} px ({:+.1f} right, {:+.1f} down) between the first "
-               "frame of light '{}' and its second; at most {:g} px may be: make camera and fabric "
-               "fast, check the calibration, and capture every frame again",
-               shift.px.norm(), shift.px.x(), shift.px.y(), rig_.lights[0].name,
-               options_.max_shift_px)});
+  }
+
+  // A shaded light is no other one, nor dim.
+  void CheckShades() {
+    for (CaptureFault& fault : ShadedFaults(rig_, looks_, signal_, on_, options_)) {
+      is_shaded_[fault.lights[0]] = true;
+      check_.faults.push_back(std::move(fault));
     }
   }
 
@@ -166,28 +165,35 @@ class CaptureChecker {
     check_.faults.push_back({.kind = kind, .lights = std::move(lights), .text = std::move(text)});
   }
 
-  void CheckLevels() {
-    const double change =
-        LightsAreCalibrated(rig_) ? options_.max_level_change : options_.max_rough_level_change;
+  void FindDark() {
     on_.assign(signal_.size(), true);
+    is_shaded_.assign(signal_.size(), false);
     for (size_t k = 0; k < signal_.size(); ++k) {
       const double level = check_.levels[k];
-      const std::string& name = rig_.lights[k].name;
       if (!(level >= options_.min_level)) {  // also NaN
         on_[k] = false;
         AddFault(CaptureFaultKind::kDark, {k},
                  fmt::format("light '{}' was not on: its frame has {:.0f} % of the light that the "
                              "rig says; check its cable: sateen light {}",
-                             name, 100.0 * level, rig_.lights[k].channel));
+                             rig_.lights[k].name, 100.0 * level, rig_.lights[k].channel));
       } else if (level > kDoubled) {
         on_[k] = false;
-      } else if (std::abs(level - 1.0) > change) {
+      }
+    }
+  }
+
+  void CheckLevels() {
+    const double change =
+        LightsAreCalibrated(rig_) ? options_.max_level_change : options_.max_rough_level_change;
+    for (size_t k = 0; k < signal_.size(); ++k) {
+      const double level = check_.levels[k];
+      if (on_[k] && !is_shaded_[k] && std::abs(level - 1.0) > change) {
         AddFault(
             CaptureFaultKind::kLevel, {k},
             fmt::format("light '{}' has {:.0f} % of the light that the rig says, against the "
                         "others; at most {:.0f} % may be between: check the light and what may "
                         "shade it, or calibrate anew",
-                        name, 100.0 * level, 100.0 * change));
+                        rig_.lights[k].name, 100.0 * level, 100.0 * change));
       }
     }
     for (size_t k = 0; k < signal_.size(); ++k) {
@@ -300,6 +306,7 @@ class CaptureChecker {
   std::vector<Field> signal_;     // s of (1)
   std::vector<Field> predicted_;  // E of (1)
   std::vector<bool> on_;          // one light, alone
+  std::vector<bool> is_shaded_;
   CaptureCheck check_;
 };
 
@@ -318,7 +325,7 @@ Status FrameCheckOptions::Validate() const {
         Range{"other_light_misfit", other_light_misfit, 1.0},
         Range{"max_ambient", max_ambient, 1.0}, Range{"max_drift", max_drift, 1.0},
         Range{"max_shift_px", max_shift_px, 100.0}, Range{"min_shift_peak", min_shift_peak, 1.0},
-        Range{"max_exposure_error", max_exposure_error, 1.0}}) {
+        Range{"min_shade", min_shade, 1.0}, Range{"max_exposure_error", max_exposure_error, 1.0}}) {
     if (!(value > 0.0 && value <= most)) {
       return Fail(ErrorCode::kInvalidArgument, "{} is {}; need more than 0 and at most {:g}", name,
                   value, most);
