@@ -28,17 +28,20 @@ struct ReadingNoise {
 ///
 ///     i = sum_b w_b v_b / H_b / sum_b w_b,   w_b = H_b^2 / var(i_0 H_b), 0 where v_b is saturated (1)
 ///
-/// i_0 is the radiance by the longest exposure that is not saturated: one figure for all b, because a
-/// weight from each reading's own noise would prefer those that noise has made small. Of its noise
-/// only the ratio of the weights keeps something, and that only between shot and read noise.
+/// i_0 is the radiance by the longest exposure that is not saturated, as the mean over the 5 x 5 samples
+/// of its kind around: one figure for all b, and hardly the noise of the reading itself. A weight from
+/// that would prefer readings that noise has made small: of a few electrons, by 1 % of their noise.
 ///
 /// Exposures are added from the longest to the shortest.
-/// Memory   three floats a sample, however many exposures; the same bits every time
+/// Memory   three floats a sample, and three more while one is added, however many there are; the same
+///          bits every time
 /// Source   weights by inverse variance: Hasinoff, Durand, Freeman, "Noise-optimal capture for high
 ///          dynamic range photography", CVPR 2010; i_0 as the place of the variance is ours.
 class ExposureMerge {
  public:
-  explicit ExposureMerge(ImageSize size) : first_(size), mean_(size), weight_(size) {}
+  // `stride` from a sample to the next one of its kind: 2 in a mosaic.
+  ExposureMerge(ImageSize size, int stride)
+      : stride_(stride), first_(size), mean_(size), weight_(size) {}
 
   // `readings` above black; `saturation`: the reading from which on they say nothing.
   void Add(const Image<float>& readings, double exposure, float saturation,
@@ -47,6 +50,7 @@ class ExposureMerge {
   [[nodiscard]] Image<float> Radiance(float saturated) const;
 
  private:
+  int stride_;
   Image<float> first_;   // i_0, where weight_ is above 0
   Image<float> mean_;    // i of (1), of what has been added so far
   Image<float> weight_;  // denominator of (1)

@@ -10,7 +10,8 @@
 namespace sateen {
 namespace {
 
-constexpr double kDoubled = 1.4;  // a level from which on another light may be on too
+constexpr double kFitsAsWell = 5.0;  // times the usual misfit of a frame at its own light
+constexpr double kDoubled = 1.4;     // a level from which on another light may be on too
 
 using Field = std::vector<double>;  // one value a block
 
@@ -207,22 +208,25 @@ class CaptureChecker {
     }
   }
 
-  // Mean log of all lights that are on, block by block.
-  [[nodiscard]] Field MeanLog(const std::vector<Field>& all) const {
-    Field mean(all[0].size());
-    const auto share = 1.0 / static_cast<double>(std::ranges::count(on_, true));
-    for (size_t k = 0; k < all.size(); ++k) {
-      for (size_t b = 0; b < mean.size() && on_[k]; ++b) {
-        mean[b] += share * std::log(all[k][b]);
+  // Median log of all lights that are on, block by block: one shaded frame must not bend the others.
+  [[nodiscard]] Field MedianLog(const std::vector<Field>& all) const {
+    Field median;
+    for (size_t b = 0; b < all[0].size(); ++b) {
+      std::vector<double> logs;
+      for (size_t k = 0; k < all.size(); ++k) {
+        if (on_[k]) {
+          logs.push_back(std::log(std::max(all[k][b], 1e-30)));
+        }
       }
+      median.push_back(Median(std::move(logs)));
     }
-    return mean;
+    return median;
   }
 
   // (3); not finite where a value is not above 0.
-  static Field Pattern(Field field, const Field& mean_log) {
-    std::ranges::transform(field, mean_log, field.begin(),
-                           [](double value, double mean) { return std::log(value) - mean; });
+  static Field Pattern(Field field, const Field& median_log) {
+    std::ranges::transform(field, median_log, field.begin(),
+                           [](double value, double median) { return std::log(value) - median; });
     return field;
   }
 
@@ -247,14 +251,14 @@ class CaptureChecker {
     if (!has_pattern_) {
       return "";
     }
-    const Field q = Pattern(signal_[k], MeanLog(signal_));
-    const Field mean_predicted = MeanLog(predicted_);
+    const Field q = Pattern(signal_[k], MedianLog(signal_));
+    const Field median_predicted = MedianLog(predicted_);
     size_t best = k;
     double least = 0.0;
     for (size_t j = 0; j < predicted_.size(); ++j) {
       Field both = predicted_[k];
       std::ranges::transform(both, predicted_[j], both.begin(), std::plus<>());
-      const double misfit = Misfit(q, Pattern(both, mean_predicted));
+      const double misfit = Misfit(q, Pattern(both, median_predicted));
       if (j != k && (best == k || misfit < least)) {
         best = j;
         least = misfit;
@@ -263,38 +267,56 @@ class CaptureChecker {
     return best == k ? "" : fmt::format(", as if light '{}' were on too", rig_.lights[best].name);
   }
 
+  // Misfit (4) of a frame at its own light, and at the light where it is least.
+  struct Fit {
+    double own = 0.0;
+    double least = 0.0;
+    size_t best = 0;
+  };
+
+  static Fit FitOf(size_t k, const Field& q, const std::vector<Field>& patterns) {
+    const double own = Misfit(q, patterns[k]);
+    Fit fit{.own = own, .least = own, .best = k};
+    for (size_t j = 0; j < patterns.size(); ++j) {
+      const double misfit = Misfit(q, patterns[j]);
+      if (misfit < fit.least) {
+        fit.best = j;
+        fit.least = misfit;
+      }
+    }
+    return fit;
+  }
+
   void CheckPatterns() {
     if (!has_pattern_ || std::ranges::count(on_, true) < 2) {
       return;
     }
-    const Field mean_signal = MeanLog(signal_);
-    const Field mean_predicted = MeanLog(predicted_);
+    const Field median_signal = MedianLog(signal_);
+    const Field median_predicted = MedianLog(predicted_);
     std::vector<Field> patterns;
     for (const Field& field : predicted_) {
-      patterns.push_back(Pattern(field, mean_predicted));
+      patterns.push_back(Pattern(field, median_predicted));
     }
+    std::vector<Fit> fits(signal_.size());
+    std::vector<double> own;
     for (size_t k = 0; k < signal_.size(); ++k) {
-      if (!on_[k]) {
-        continue;
+      if (on_[k]) {
+        fits[k] = FitOf(k, Pattern(signal_[k], median_signal), patterns);
+        own.push_back(fits[k].own);
       }
-      const Field q = Pattern(signal_[k], mean_signal);
-      const double own = Misfit(q, patterns[k]);
-      size_t best = k;
-      double least = own;
-      for (size_t j = 0; j < patterns.size(); ++j) {
-        const double misfit = Misfit(q, patterns[j]);
-        if (misfit < least) {
-          best = j;
-          least = misfit;
-        }
-      }
-      if (best != k && least < options_.other_light_misfit * own) {
+    }
+    const double usual = Median(own);
+    for (size_t k = 0; k < signal_.size(); ++k) {
+      const Fit& fit = fits[k];
+      // A shaded frame fits no light; a frame of another light fits that one as well as others theirs.
+      if (on_[k] && fit.best != k && fit.least < options_.other_light_misfit * fit.own &&
+          fit.least < kFitsAsWell * usual) {
         AddFault(
             CaptureFaultKind::kOtherLight, {k},
             fmt::format("the frame of light '{}' is lit from where the rig has light '{}'; are "
                         "they swapped? Check the channels of both ({} and {})",
-                        rig_.lights[k].name, rig_.lights[best].name, rig_.lights[k].channel,
-                        rig_.lights[best].channel));
+                        rig_.lights[k].name, rig_.lights[fit.best].name, rig_.lights[k].channel,
+                        rig_.lights[fit.best].channel));
       }
     }
   }

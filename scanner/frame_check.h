@@ -100,14 +100,15 @@ struct CaptureLooks {
 ///
 ///     s_kb = i_kb - dark_b,   E_kb = e_k (n . l_k) at the block's place on the table          (1)
 ///     level_k = sum_b s_kb / sum_b E_kb,  over its median                 (2)
-///     q_kb = log s_kb - mean_j log s_jb,   r_kb = log E_kb - mean_j log E_jb                  (3)
+///     q_kb = log s_kb - med_j log s_jb,   r_kb = log E_kb - med_j log E_jb                    (3)
 ///     misfit_kj = var_b (q_kb - r_jb)                                                         (4)
 ///
-/// The mean over lights in (3) takes the texture of a fabric out; it runs over the lights that are on,
-/// so that lights that have changed places do not disturb it. A light that is off has a level below
-/// min_level; two that are on together have one too high; lights that have changed places have the
-/// least misfit at another light than their own. Levels are only checked of a rig whose lights have
-/// been calibrated, patterns only where the camera has a pose and the lights are no distant ones.
+/// The median over lights in (3) takes the texture of a fabric out; it runs over the lights that are
+/// on, so that lights that have changed places do not disturb it. A light that is off has a level
+/// below min_level; two that are on together have one too high; lights that have changed places have
+/// the least misfit at another light than their own, as little as other frames at theirs. Levels are
+/// only checked of a rig whose lights have been calibrated, patterns only where the camera has a pose
+/// and the lights are no distant ones.
 /// The dark at the end against the dark at the start tells of ambient light, the first light again of
 /// drift (its sum over blocks). All frames are laid over the first (RegisterFrames), and what lies on
 /// one frame alone is looked for (FindShades), once the lights are those that the rig says.

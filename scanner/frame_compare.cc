@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <string>
+#include <utility>
 
 #include "scanner/shade_check.h"
 
@@ -59,6 +60,71 @@ std::string WhereInPicture(const Eigen::Vector2d& place) {
     return "in the middle";
   }
   return "at the " + row + (row.empty() || column.empty() ? "" : " ") + column;
+}
+
+CaptureFault OtherLightFault(const Rig& rig, size_t light, size_t other) {
+  return {.kind = CaptureFaultKind::kOtherLight,
+          .lights = {light},
+          .text = fmt::format(
+              "the frame of light '{}' is lit from where the rig has light '{}'; are they swapped? "
+              "Check the channels of both ({} and {})",
+              rig.lights[light].name, rig.lights[other].name, rig.lights[light].channel,
+              rig.lights[other].channel)};
+}
+
+CaptureFault ShadeFault(const Rig& rig, size_t light, const Shade& shade) {
+  return {.kind = CaptureFaultKind::kShaded,
+          .lights = {light},
+          .text = fmt::format(
+              "a shadow lies on the frame of light '{}', {}: {:.0f} % of the picture have {:.0f} % "
+              "less light than the other frames say; keep out of the light, and see that nothing "
+              "hangs into it",
+              rig.lights[light].name, WhereInPicture(shade.middle), 100.0 * shade.share,
+              100.0 * shade.depth)};
+}
+
+FramesToShade BlocksOf(const Rig& rig, const BlockMeans& means,
+                       const std::vector<std::vector<double>>& signal,
+                       const std::vector<size_t>& of) {
+  FramesToShade frames{.grid = means.grid};
+  for (const size_t light : of) {
+    frames.signal.push_back(signal[light]);
+  }
+  frames.light.resize(of.size());
+  const Eigen::Vector3d eye_mm = rig.camera->table_from_camera.translation();
+  for (int row = 0; row < means.grid.rows; ++row) {
+    for (int column = 0; column < means.grid.columns; ++column) {
+      const Eigen::Vector2d px = means.Center(column, row);
+      const std::optional<Eigen::Vector3d> x_mm = TablePointOfPixel(*rig.camera, px.x(), px.y());
+      frames.view.push_back(x_mm ? Eigen::Vector3d((eye_mm - *x_mm).normalized())
+                                 : Eigen::Vector3d::UnitZ());
+      for (size_t frame = 0; frame < of.size(); ++frame) {
+        frames.light[frame].push_back(LightAt(rig, rig.lights[of[frame]], px));
+      }
+    }
+  }
+  return frames;
+}
+
+// The frame with which this one has to change lights for all of them to be explained far better.
+std::optional<size_t> SwappedWith(size_t frame, const FrameCheckOptions& options,
+                                  FramesToShade& frames) {
+  const double own = MisfitOfLights(frames);
+  double least = std::sqrt(options.other_light_misfit) * own;  // an option of squares
+  std::optional<size_t> best;
+  for (size_t other = 0; other < frames.light.size(); ++other) {
+    if (other == frame) {
+      continue;
+    }
+    std::swap(frames.light[frame], frames.light[other]);
+    const double misfit = MisfitOfLights(frames);
+    std::swap(frames.light[frame], frames.light[other]);
+    if (misfit < least) {
+      least = misfit;
+      best = other;
+    }
+  }
+  return best;
 }
 
 }  // namespace
@@ -122,43 +188,25 @@ std::vector<CaptureFault> ShadedFaults(const Rig& rig, const CaptureLooks& looks
   if (!rig.camera || !rig.camera->has_pose) {
     return {};
   }
-  const BlockMeans& means = looks.lit[0]->means;
-  FramesToShade frames{.grid = means.grid};
-  std::vector<size_t> of;
+  std::vector<size_t> of;  // which light each frame is of
   for (size_t k = 0; k < signal.size(); ++k) {
     if (on[k]) {
       of.push_back(k);
-      frames.signal.push_back(signal[k]);
     }
   }
-  frames.light.resize(of.size());
-  for (int row = 0; row < means.grid.rows; ++row) {
-    for (int column = 0; column < means.grid.columns; ++column) {
-      const Eigen::Vector2d px = means.Center(column, row);
-      const std::optional<Eigen::Vector3d> x_mm = TablePointOfPixel(*rig.camera, px.x(), px.y());
-      const Eigen::Vector3d eye_mm = rig.camera->table_from_camera.translation();
-      frames.view.push_back(x_mm ? Eigen::Vector3d((eye_mm - *x_mm).normalized())
-                                 : Eigen::Vector3d::UnitZ());
-      for (size_t frame = 0; frame < of.size(); ++frame) {
-        frames.light[frame].push_back(LightAt(rig, rig.lights[of[frame]], px));
-      }
-    }
-  }
-  std::vector<CaptureFault> faults;
+  FramesToShade frames = BlocksOf(rig, looks.lit[0]->means, signal, of);
   const std::vector<std::optional<Shade>> shades = FindShades(frames, options.min_shade);
+  std::vector<CaptureFault> faults;
   for (size_t frame = 0; frame < shades.size(); ++frame) {
-    if (const std::optional<Shade>& shade = shades[frame]) {
-      faults.push_back(
-          {.kind = CaptureFaultKind::kShaded,
-           .lights = {of[frame]},
-           .text = fmt::format(
-               "a shadow lies on the frame of light '{}', {}: {:.0f} % of the picture have {:.0f} "
-               "% "
-               "less light than the other frames say; keep out of the light, and see that nothing "
-               "hangs into it",
-               rig.lights[of[frame]].name, WhereInPicture(shade->middle), 100.0 * shade->share,
-               100.0 * shade->depth)});
+    if (!shades[frame]) {
+      continue;
     }
+    if (const std::optional<size_t> other = SwappedWith(frame, options, frames)) {
+      const size_t a = std::min(of[frame], of[*other]);
+      const size_t b = std::max(of[frame], of[*other]);
+      return {OtherLightFault(rig, a, b), OtherLightFault(rig, b, a)};
+    }
+    faults.push_back(ShadeFault(rig, of[frame], *shades[frame]));
   }
   return faults;
 }

@@ -19,7 +19,8 @@ namespace sateen {
                                                      const std::vector<Shift>& shifts,
                                                      const FrameCheckOptions& options);
 
-// kShaded, of one light each. `signal`: [light][block], dark subtracted.
+// kShaded, of one light each; kOtherLight of two where it is their places that are exchanged, which on
+// cloth that does not lie flat only normals show. `signal`: [light][block], dark subtracted.
 [[nodiscard]] std::vector<CaptureFault> ShadedFaults(const Rig& rig, const CaptureLooks& looks,
                                                      const std::vector<std::vector<double>>& signal,
                                                      const std::vector<bool>& on,

@@ -9,13 +9,14 @@
 namespace sateen {
 namespace {
 
+constexpr int kMargin = 2;            // cells that a derivative takes to each side
 constexpr int kTile = 8;              // cells along each side
 constexpr int kFewestTileCells = 32;  // along each side of the picture
 constexpr int kLevels = 4;            // of the pyramid, each half of the one before
-constexpr int kCoarseSteps = 3;
-constexpr int kFineSteps = 3;
-constexpr double kLightError = 0.3;  // a of (1), of |l|
-constexpr double kMostCells = 1.5;   // that one step may go: beyond that (1) is no longer linear
+constexpr int kMostSteps = 6;         // of Gauss-Newton on a level
+constexpr double kSmallCells = 0.01;  // a step that ends a level
+constexpr double kLightError = 0.3;   // a of (1), of |l|
+constexpr double kMostCells = 1.5;    // that one step may go: beyond that (1) is no longer linear
 constexpr double kPxOfCell = 2.0;
 constexpr Eigen::Index kUnknowns = 5;  // of a frame: dx, dy, and a
 
@@ -109,6 +110,12 @@ Image<float> Moved(const Image<float>& image, const Eigen::Vector2d& shift) {
   return moved;
 }
 
+// Of the parabola of fourth order: a difference of two neighbours would be a third too small for a
+// texture of 4 cells, and the steps that much too large.
+double Slope(float before2, float before, float after, float after2) {
+  return (8.0 * static_cast<double>(after - before) - static_cast<double>(after2 - before2)) / 12.0;
+}
+
 // What (2) adds up of one tile, or of all.
 struct NormalEquations {
   Matrix a;
@@ -128,12 +135,12 @@ class Level {
     }
     const int width = bright_.width;
     const int height = bright_.height;
-    for (int y = 1; y + 1 < height; y += kTile) {
-      for (int x = 1; x + 1 < width; x += kTile) {
+    for (int y = kMargin; y + kMargin < height; y += kTile) {
+      for (int x = kMargin; x + kMargin < width; x += kTile) {
         Tile tile{.left = x,
                   .top = y,
-                  .right = std::min(x + kTile, width - 1),
-                  .bottom = std::min(y + kTile, height - 1)};
+                  .right = std::min(x + kTile, width - kMargin),
+                  .bottom = std::min(y + kTile, height - kMargin)};
         const Eigen::Vector2d middle(0.5 * (tile.left + tile.right - 1),
                                      0.5 * (tile.top + tile.bottom - 1));
         if (AddLights(input, (middle.array() + 0.5) * cells - 0.5, tile)) {
@@ -158,8 +165,8 @@ class Level {
     return cells > 0.0 ? sum / cells : std::numeric_limits<double>::infinity();
   }
 
-  // One step of Gauss-Newton from `shifts`; `covariance` of the shifts, 2 x 2 a frame.
-  void Step(std::vector<Eigen::Vector2d>& shifts, std::vector<double>& sd) {
+  // One step of Gauss-Newton from `shifts`; returns the longest, in cells.
+  double Step(std::vector<Eigen::Vector2d>& shifts, std::vector<double>& sd) {
     Move(shifts);
     scale_ = MedianMisfit();
     const Eigen::Index size = kUnknowns * count_;
@@ -178,7 +185,7 @@ class Level {
       sum_w += w_.sum();
     }
     if (sum_w <= 0.0) {
-      return;
+      return 0.0;
     }
     const double variance = sum_r2 / (sum_w * static_cast<double>(count_ - 3));
     AddRidge(variance, all.a);
@@ -186,12 +193,15 @@ class Level {
     const Vector theta = solver.solve(all.b);
     const Matrix half = solver.solve(Matrix(outer.selfadjointView<Eigen::Lower>()));
     const Matrix covariance = solver.solve(half.transpose());
+    double longest = 0.0;
     for (Eigen::Index k = 1; k < count_; ++k) {
       Eigen::Vector2d step = theta.segment<2>(kUnknowns * k);
       step *= std::min(1.0, kMostCells / std::max(step.norm(), 1e-12));
       shifts[static_cast<size_t>(k)] += step;
+      longest = std::max(longest, step.norm());
       sd[static_cast<size_t>(k)] = std::sqrt(covariance.diagonal().segment<2>(kUnknowns * k).sum());
     }
+    return longest;
   }
 
  private:
@@ -263,8 +273,10 @@ class Level {
     for (Eigen::Index k = 0; k < count_; ++k) {
       const Image<float>& frame = moved_[static_cast<size_t>(k)];
       const auto value = static_cast<double>(frame.At(x, y));
-      const double dx = 0.5 * static_cast<double>(frame.At(x + 1, y) - frame.At(x - 1, y));
-      const double dy = 0.5 * static_cast<double>(frame.At(x, y + 1) - frame.At(x, y - 1));
+      const double dx =
+          Slope(frame.At(x - 2, y), frame.At(x - 1, y), frame.At(x + 1, y), frame.At(x + 2, y));
+      const double dy =
+          Slope(frame.At(x, y - 2), frame.At(x, y - 1), frame.At(x, y + 1), frame.At(x, y + 2));
       if (!std::isfinite(value + dx + dy)) {
         return false;
       }
@@ -373,8 +385,10 @@ class Registration {
       for (Eigen::Vector2d& shift : shifts) {
         shift /= cells;
       }
-      for (int step = 0; step < (level == 0 ? kFineSteps : kCoarseSteps); ++step) {
-        levels_[level].Step(shifts, sd_);
+      for (int step = 0; step < kMostSteps; ++step) {
+        if (levels_[level].Step(shifts, sd_) < kSmallCells) {
+          break;
+        }
       }
       for (Eigen::Vector2d& shift : shifts) {
         shift *= cells;

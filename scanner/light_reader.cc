@@ -50,6 +50,7 @@ Result<LightFrame> DevelopOne(const FrameFile& file, RawMosaic mosaic) {
 Result<LightFrame> DevelopSeveral(const LightFiles& files) {
   std::optional<ExposureMerge> merge;
   RawMosaic last;
+  ImageSize size_px;
   SensorReading reading;
   for (const FrameFile& file : files) {
     Result<RawMosaic> mosaic = ReadRawMosaic(file.path);
@@ -62,8 +63,14 @@ Result<LightFrame> DevelopSeveral(const LightFiles& files) {
     }
     reading = *of_file;
     last = *std::move(mosaic);
+    if (const Status same = CheckSize(file.path.string(), last.samples.Size(),
+                                      merge ? size_px : last.samples.Size());
+        !same) {
+      return tl::unexpected(same.error());
+    }
     if (!merge) {
-      merge.emplace(last.samples.Size());
+      size_px = last.samples.Size();
+      merge.emplace(last.samples.Size(), 2);
     }
     for (float& site : last.samples.pixels) {
       site = site >= reading.saturation ? std::numeric_limits<float>::infinity()
@@ -88,22 +95,31 @@ Result<LightFrame> DevelopSeveral(const LightFiles& files) {
 // Images, one or several.
 Result<LightFrame> MergePhotos(const LightFiles& files, Encoding encoding, bool& was_srgb) {
   std::vector<ExposureMerge> merges;
+  LightFrame frame;
   std::optional<float> saturation;
   for (const FrameFile& file : files) {
     const Result<Photo> photo = ReadPhoto(file.path, encoding);
     if (!photo) {
       return tl::unexpected(photo.error());
     }
+    if (!merges.empty()) {
+      const Status same = CheckSize(file.path.string(), photo->rgb.Size(), frame.rgb.Size());
+      if (!same) {
+        return tl::unexpected(same.error());
+      }
+    }
+    if (merges.empty()) {
+      frame.rgb = Image3(photo->rgb.Size());
+    }
     was_srgb = was_srgb || photo->was_srgb;
     saturation = photo->saturation;
-    merges.resize(3, ExposureMerge(photo->rgb.Size()));
+    merges.resize(3, ExposureMerge(photo->rgb.Size(), 1));
     for (size_t c = 0; c < 3; ++c) {
       merges[c].Add(photo->rgb[c], file.exposure,
                     saturation.value_or(std::numeric_limits<float>::infinity()), {});
     }
   }
   const SensorReading reading = ReadingOf(files.front());
-  LightFrame frame;
   if (saturation) {
     frame.full_scale = reading.Largest() * *saturation / static_cast<float>(files.back().exposure);
   }

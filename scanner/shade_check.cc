@@ -49,22 +49,27 @@ class ShadeFinder {
         level_(count_, 1.0),
         y_(count_, BlockField(blocks_, kUnknown)) {}
 
+  double Misfit() {
+    if (count_ < kFewestFrames || !PredictAll()) {
+      return std::numeric_limits<double>::infinity();
+    }
+    double sum = 0.0;
+    double count = 0.0;
+    for (const BlockField& field : y_) {
+      for (const double y : field) {
+        sum += std::isfinite(y) ? std::abs(y) : 0.0;
+        count += std::isfinite(y) ? 1.0 : 0.0;
+      }
+    }
+    return sum / count;
+  }
+
   std::vector<std::optional<Shade>> Find() {
     if (count_ < kFewestFrames) {
       return {};
     }
-    // Levels first, or a light of another brightness than the rig says would bend every N.
-    for (int round = 0; round < 2; ++round) {
-      for (size_t b = 0; b < blocks_; ++b) {
-        Predict(b);
-      }
-      for (size_t k = 0; k < count_; ++k) {
-        const double level = Quantile(y_[k], 0.5);
-        if (!std::isfinite(level)) {
-          return {};
-        }
-        level_[k] *= round == 0 ? std::exp(level) : 1.0;
-      }
+    if (!PredictAll()) {
+      return {};
     }
     TakeOutMaterial();
     std::vector<BlockField> depths;
@@ -84,6 +89,23 @@ class ShadeFinder {
   }
 
  private:
+  // (1). Levels first, or a light of another brightness than the rig says would bend every N.
+  bool PredictAll() {
+    for (int round = 0; round < 2; ++round) {
+      for (size_t b = 0; b < blocks_; ++b) {
+        Predict(b);
+      }
+      for (size_t k = 0; k < count_; ++k) {
+        const double level = Quantile(y_[k], 0.5);
+        if (!std::isfinite(level)) {
+          return false;
+        }
+        level_[k] *= round == 0 ? std::exp(level) : 1.0;
+      }
+    }
+    return true;
+  }
+
   // (1) at one block.
   void Predict(size_t b) {
     const auto rows = static_cast<Eigen::Index>(count_);
@@ -287,5 +309,7 @@ class ShadeFinder {
 std::vector<std::optional<Shade>> FindShades(const FramesToShade& frames, double min_depth) {
   return ShadeFinder(frames, min_depth).Find();
 }
+
+double MisfitOfLights(const FramesToShade& frames) { return ShadeFinder(frames, 1.0).Misfit(); }
 
 }  // namespace sateen

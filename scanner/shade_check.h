@@ -46,4 +46,7 @@ struct Shade {
 [[nodiscard]] std::vector<std::optional<Shade>> FindShades(const FramesToShade& frames,
                                                            double min_depth);
 
+// Mean of |y| of (1): how badly these lights explain these frames. Infinite where it cannot be told.
+[[nodiscard]] double MisfitOfLights(const FramesToShade& frames);
+
 }  // namespace sateen

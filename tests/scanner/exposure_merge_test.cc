@@ -69,7 +69,7 @@ TEST(ExposureMerge, IsUnbiasedAndAsGoodAsCanBe) {
   const ReadingNoise noise = NoiseOfSensor(sensor);
   uint64_t seed = 1;
   for (const double radiance : {3e-5, 3e-4, 3e-3, 0.03, 0.05, 0.2, 0.5, 0.9}) {
-    ExposureMerge merge({kSide, kSide});
+    ExposureMerge merge({kSide, kSide}, 2);
     double information = 0.0;  // sum of H^2 / var: the bound of Cramer and Rao is its inverse
     for (const double exposure : kExposures) {
       merge.Add(ReadingsOf(sensor, radiance, exposure, seed++), exposure, kSaturation, noise);
@@ -88,14 +88,14 @@ TEST(ExposureMerge, IsUnbiasedAndAsGoodAsCanBe) {
 }
 
 TEST(ExposureMerge, WeighsByExposureWhereTheNoiseIsNotKnown) {
-  ExposureMerge merge({1, 1});
+  ExposureMerge merge({1, 1}, 1);
   merge.Add(Image<float>(1, 1, 0.4F), 4.0, kSaturation, {});
   merge.Add(Image<float>(1, 1, 0.2F), 1.0, kSaturation, {});
   EXPECT_FLOAT_EQ(merge.Radiance(9.0F).At(0, 0), (4.0F * 0.1F + 1.0F * 0.2F) / 5.0F);
 }
 
 TEST(ExposureMerge, LeavesOutWhatIsSaturatedAndSaysWhereAllAre) {
-  ExposureMerge merge({3, 1});
+  ExposureMerge merge({3, 1}, 1);
   Image<float> longest(3, 1, 1.0F);
   longest.At(2, 0) = 0.4F;
   Image<float> shortest(3, 1, 0.5F);
@@ -107,7 +107,7 @@ TEST(ExposureMerge, LeavesOutWhatIsSaturatedAndSaysWhereAllAre) {
 }
 
 TEST(ExposureMerge, OneExposureStaysAsItIs) {
-  ExposureMerge merge({1, 1});
+  ExposureMerge merge({1, 1}, 1);
   merge.Add(Image<float>(1, 1, 0.3F), 0.7, kSaturation, NoiseOfSensor(NoisySensor()));
   EXPECT_EQ(merge.Radiance(9.0F).At(0, 0), 0.3F * static_cast<float>(1.0 / 0.7));
 }

@@ -4,6 +4,7 @@
 
 #include <functional>
 
+#include "tests/scanner/captures.h"
 #include "tests/scanner/simulated_looks.h"
 
 // Simulated sessions, with what goes wrong in a capture: how often each is found.
@@ -14,7 +15,7 @@ using testing::CalibratedRig;
 using testing::Fabric;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
-using testing::kLookLookLights;
+using testing::kLookLights;
 using testing::LookAt;
 using testing::Mixed;
 using testing::SessionLooks;

@@ -14,8 +14,9 @@ namespace sateen {
 namespace {
 
 using ::testing::Each;
-using ::testing::Field;
 using testing::kLookLights;
+
+MATCHER(IsUnknown, "") { return std::isinf(arg.sd_px); }
 
 constexpr size_t kFrames = kLookLights + 1;  // and the first light again
 constexpr int kWidth = 128;
@@ -135,14 +136,14 @@ TEST(RegisterFrames, LeavesAsideWhatIsSaturatedOrShaded) {
 }
 
 TEST(RegisterFrames, TellsNothingWithoutTextureOrWithTooFewFrames) {
-  Cloth cloth(NudgedFrom(kFrames, {}));
+  Cloth cloth(NudgedFrom(kFrames, Eigen::Vector2d::Zero()));
   for (Image<float>& image : cloth.images) {
     std::ranges::fill(image.pixels, 0.5F);
   }
-  EXPECT_THAT(cloth.Register(cloth.rig), Each(Field(&Shift::sd_px, std::isinf<double>)));
-  Cloth few(NudgedFrom(kFrames, {}));
+  EXPECT_THAT(cloth.Register(cloth.rig), Each(IsUnknown()));
+  Cloth few(NudgedFrom(kFrames, Eigen::Vector2d::Zero()));
   few.images.resize(4);
-  EXPECT_THAT(few.Register(few.rig), Each(Field(&Shift::sd_px, std::isinf<double>)));
+  EXPECT_THAT(few.Register(few.rig), Each(IsUnknown()));
 }
 
 TEST(IsSignificant, AsksForThreeStandardDeviationsAndATwentiethOfAPixel) {
@@ -157,12 +158,18 @@ TEST(ShiftBetween, TellsNothingWithoutTexture) {
   EXPECT_EQ(ShiftBetween(flat, Image<float>(80, 58)).peak, 0.0);
 }
 
-// A twill, nudged by 0.4 px between frames 5 and 6: what the solve makes of it.
+// A weave of 16 px a yarn with a fine print, nudged by 0.4 px between frames 5 and 6: what the solve
+// makes of it. Rendered at twice the size, because a pixel's one ray would not move with the picture.
 TEST(LayOverFirst, MendsTheNormalsOfANudgedSession) {
-  const Rig rig = testing::CalibratedRig();
-  Scene scene = testing::SceneOf("twill", rig);
-  scene.lens.psf_sigma_px = 0.8;
-  const testing::Fabric fabric(std::move(scene), {0.4, 0.0});
+  const Rig rig = RingRig(testing::kLookPx, LightModel::kLed, 40.0);
+  Scene scene{.rig = RingRig({2 * testing::kLookPx.width, 2 * testing::kLookPx.height},
+                             LightModel::kLed, 40.0)};
+  scene.surface = *MakeWeave({.pitch_mm = 4.0, .fill = 1.0, .edge_rad = 0.4});
+  const Material printed{.albedo = WavyAlbedo{.min = 0.2, .max = 0.8, .period_mm = 2.0}};
+  scene.materials.assign(scene.surface->Parts().size(), printed);
+  scene.lens = {.psf_sigma_px = 1.2};
+  testing::Fabric fabric(std::move(scene), {0.8, 0.0});
+  fabric.Bin();
   testing::SessionLooks looks(fabric, 1);
   looks.Nudge(fabric, 5, 1);
   const std::vector<Shift> shifts =

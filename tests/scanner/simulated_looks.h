@@ -90,6 +90,35 @@ struct Fabric {
       nudged.push_back(bumped.Render(k)->radiance);
     }
   }
+  // Each square of 2 x 2 pixels joined to one.
+  void Bin() {
+    for (Image3& frame : lit) {
+      frame = Binned(frame);
+    }
+    for (Image3& frame : nudged) {
+      frame = Binned(frame);
+    }
+    dark = Binned(dark);
+    normal = Binned(normal);
+    for (size_t p = 0; p < normal[0].pixels.size(); ++p) {
+      const float length =
+          Eigen::Vector3f(normal[0].pixels[p], normal[1].pixels[p], normal[2].pixels[p]).norm();
+      for (Image<float>& plane : normal.planes) {
+        plane.pixels[p] /= length;
+      }
+    }
+  }
+  static Image3 Binned(const Image3& image) {
+    Image3 binned(ImageSize{image.Size().width / 2, image.Size().height / 2});
+    for (size_t c = 0; c < 3; ++c) {
+      for (int y = 0; y < image.Size().height; ++y) {
+        for (int x = 0; x < image.Size().width; ++x) {
+          binned[c].At(x / 2, y / 2) += 0.25F * image[c].At(x, y);
+        }
+      }
+    }
+    return binned;
+  }
   static Scene WithShadows(Scene scene) {
     scene.illumination.shadows = Shadows::kCast;
     scene.lens.psf_sigma_px = 0.8;  // or yarns of a few pixels would alias
