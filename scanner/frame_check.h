@@ -47,8 +47,7 @@ struct FrameCheckOptions {
 // What the checks keep of a frame.
 struct FrameLook {
   BlockMeans means;
-  // Middle of the picture for the shift: cells of 2 x 2 sites or pixels, at most 512 x 512 of them,
-  // over the exposure; not finite where saturated.
+  // Middle of the picture for the shift (AddToMiddle).
   Image<float> middle;
 };
 
@@ -59,6 +58,13 @@ struct PixelPlace {
 
 // Where the first cell of the middle of a picture lies in it. [px]
 [[nodiscard]] PixelPlace OriginOfMiddle(ImageSize size_px, ImageSize cells);
+
+/// Adds the middle of a plane to one of radiance, made where it is empty: cells 2 sites apart, at most
+/// 512 x 512 of them. Each is the mean of 4 x 4 sites by the weights 1, 3, 3, 1 along both sides, which
+/// count every colour of a mosaic alike, and which let pass less of what is finer than the cells and
+/// would not move with the picture; not finite where one of them is saturated.
+void AddToMiddle(const Image<float>& plane, float saturation, double exposure,
+                 Image<float>& middle);
 
 /// Reads a frame and checks what can be told of it alone: it decodes, has the size of the rig's
 /// camera, the exposure that the camera confirmed where the file says one, and is not clipped.

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -25,41 +26,20 @@ BlockGrid GridOf(const Rig& rig) {
           .rows = std::clamp(size.height / kSitesOfBlock, 1, kCheckGrid.rows)};
 }
 
-// Cells of 2 x 2 of the middle of a plane of readings; not finite where one is saturated.
-void AddMiddle(const Image<float>& plane, float saturation, double exposure, Image<float>& middle) {
-  const int width = std::min(plane.width / 2, kMiddleCells);
-  const int height = std::min(plane.height / 2, kMiddleCells);
-  if (middle.pixels.empty()) {
-    middle = Image<float>(width, height);
-  }
-  const auto [left, top] = OriginOfMiddle(plane.Size(), middle.Size());
-  const auto per_exposure = static_cast<float>(1.0 / exposure);
-  for (int y = 0; y < height; ++y) {
-    for (int x = 0; x < width; ++x) {
-      float sum = 0.0F;
-      for (const int site : {0, 1, 2, 3}) {
-        const float value = plane.At(left + 2 * x + site % 2, top + 2 * y + site / 2);
-        sum += value < saturation ? value : std::numeric_limits<float>::quiet_NaN();
-      }
-      middle.At(x, y) += per_exposure * sum;
-    }
-  }
-}
-
 Result<Image<float>> ReadMiddle(const FrameFile& file) {
   Image<float> middle;
   if (IsRawName(file.path)) {
     return ReadRawMosaic(file.path).and_then([&](const RawMosaic& mosaic) {
       return ReadingOf(file, mosaic).map([&](const SensorReading& reading) {
-        AddMiddle(mosaic.samples, reading.saturation, file.exposure, middle);
+        AddToMiddle(mosaic.samples, reading.saturation, file.exposure, middle);
         return std::move(middle);
       });
     });
   }
   return ReadPhoto(file.path).map([&](const Photo& photo) {
     for (const Image<float>& plane : photo.rgb.planes) {
-      AddMiddle(plane, photo.saturation.value_or(std::numeric_limits<float>::infinity()),
-                file.exposure, middle);
+      AddToMiddle(plane, photo.saturation.value_or(std::numeric_limits<float>::infinity()),
+                  file.exposure, middle);
     }
     return std::move(middle);
   });
@@ -70,6 +50,35 @@ Result<Image<float>> ReadMiddle(const FrameFile& file) {
 PixelPlace OriginOfMiddle(ImageSize size_px, ImageSize cells) {
   // Even, so that the colours of a mosaic keep their places.
   return {(size_px.width / 2 - cells.width) / 2 * 2, (size_px.height / 2 - cells.height) / 2 * 2};
+}
+
+void AddToMiddle(const Image<float>& plane, float saturation, double exposure,
+                 Image<float>& middle) {
+  constexpr std::array kWeights = {0.125F, 0.375F, 0.375F, 0.125F};
+  if (middle.pixels.empty()) {
+    middle = Image<float>(std::min(plane.width / 2, kMiddleCells),
+                          std::min(plane.height / 2, kMiddleCells));
+  }
+  const auto [left, top] = OriginOfMiddle(plane.Size(), middle.Size());
+  const auto per_exposure = static_cast<float>(1.0 / exposure);
+  // Mirrored about the outermost site, which keeps the colours of a mosaic in their places.
+  const auto inside = [](int i, int count) {
+    return i < 0 ? -i : i >= count ? 2 * (count - 1) - i : i;
+  };
+  for (int y = 0; y < middle.height; ++y) {
+    for (int x = 0; x < middle.width; ++x) {
+      float sum = 0.0F;
+      for (int v = 0; v < 4; ++v) {
+        for (int u = 0; u < 4; ++u) {
+          const float value = plane.At(inside(left + 2 * x + u - 1, plane.width),
+                                       inside(top + 2 * y + v - 1, plane.height));
+          sum += kWeights[static_cast<size_t>(u)] * kWeights[static_cast<size_t>(v)] *
+                 (value < saturation ? value : std::numeric_limits<float>::quiet_NaN());
+        }
+      }
+      middle.At(x, y) += per_exposure * sum;
+    }
+  }
 }
 
 Result<FrameLook> CheckFrame(const FrameFile& file, const Rig& rig,

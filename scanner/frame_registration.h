@@ -40,7 +40,7 @@ struct FramesToRegister {
 /// v is taken less its mean over 9 x 9 cells: at an edge, an error of the light that varies over the
 /// picture then has nothing in common with the gradient.
 ///
-/// Gauss-Newton: solve (2), resample the frames by the new d (bicubic), again; from a picture of 1/8
+/// Gauss-Newton: solve (2), resample the frames by the new d (LanczosAt()), again; from a picture of 1/8
 /// of the size to the full one. (3) leaves cast shadows and highlights aside. The last frame is the
 /// first light again, so that ShiftBetween() gives a second start: all frames from some k on have
 /// moved by that. The end with the smaller sum of r counts. The covariance is

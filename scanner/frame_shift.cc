@@ -11,29 +11,9 @@ namespace {
 
 constexpr int kTaps = 6;
 
-// Six samples from `first` on, relative to the place that is asked for.
-struct Window {
-  int first = 0;
-  std::array<float, kTaps> weights = {};
-};
-
 double Sinc(double t) {
   const double x = std::numbers::pi * t;
   return std::abs(x) < 1e-9 ? 1.0 : std::sin(x) / x;
-}
-
-Window WindowOf(double shift) {
-  Window window{.first = static_cast<int>(std::floor(shift)) - kTaps / 2 + 1};
-  std::array<double, kTaps> h = {};
-  double sum = 0.0;
-  for (int m = 0; m < kTaps; ++m) {
-    const double t = shift - (window.first + m);
-    h[static_cast<size_t>(m)] = Sinc(t) * Sinc(t / 3.0);  // (1)
-    sum += h[static_cast<size_t>(m)];
-  }
-  std::ranges::transform(h, window.weights.begin(),
-                         [&](double w) { return static_cast<float>(w / sum); });
-  return window;
 }
 
 int MirroredPlace(int i, int count) {
@@ -53,7 +33,7 @@ struct Line {
   float& operator[](int i) const { return samples[static_cast<size_t>(i) * stride]; }
 };
 
-void Resample(const Window& window, double shift, float full_scale, const Line& line,
+void Resample(const LanczosWindow& window, double shift, float full_scale, const Line& line,
               std::vector<float>& copy) {
   copy.resize(static_cast<size_t>(line.count));
   for (int i = 0; i < line.count; ++i) {
@@ -81,12 +61,26 @@ void Resample(const Window& window, double shift, float full_scale, const Line& 
 
 }  // namespace
 
+LanczosWindow LanczosAt(double shift) {
+  LanczosWindow window{.first = static_cast<int>(std::floor(shift)) - kTaps / 2 + 1};
+  std::array<double, kTaps> h = {};
+  double sum = 0.0;
+  for (int m = 0; m < kTaps; ++m) {
+    const double t = shift - (window.first + m);
+    h[static_cast<size_t>(m)] = Sinc(t) * Sinc(t / 3.0);  // (1)
+    sum += h[static_cast<size_t>(m)];
+  }
+  std::ranges::transform(h, window.weights.begin(),
+                         [&](double w) { return static_cast<float>(w / sum); });
+  return window;
+}
+
 void LayOverFirst(const Eigen::Vector2d& shift_px, LightFrame& frame) {
   if (shift_px.isZero()) {
     return;
   }
-  const Window along_x = WindowOf(shift_px.x());
-  const Window along_y = WindowOf(shift_px.y());
+  const LanczosWindow along_x = LanczosAt(shift_px.x());
+  const LanczosWindow along_y = LanczosAt(shift_px.y());
   std::vector<float> copy;
   for (Image<float>& plane : frame.rgb.planes) {
     const auto width = static_cast<size_t>(plane.width);

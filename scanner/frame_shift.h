@@ -1,10 +1,19 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 
 #include "imaging/light_stack.h"
 
 namespace sateen {
+
+// What h of (1) below makes of a shift along a line: six samples, from `first` on relative to the place.
+struct LanczosWindow {
+  int first = 0;
+  std::array<float, 6> weights = {};
+};
+
+[[nodiscard]] LanczosWindow LanczosAt(double shift);
 
 /// Lays a frame that has moved by `shift_px` over the first one, by Lanczos' window of six samples:
 ///

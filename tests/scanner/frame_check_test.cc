@@ -2,8 +2,10 @@
 
 #include <gmock/gmock.h>
 
+#include <filesystem>
 #include <functional>
 
+#include "imaging/dng.h"
 #include "tests/scanner/captures.h"
 #include "tests/scanner/simulated_looks.h"
 
@@ -180,12 +182,12 @@ TEST(CheckCapture, FindsWhatGoesWrongAndNothingElse) {
 
 class CheckCaptureCase : public ::testing::Test {
  protected:
-  CheckCaptureCase() : fabric_("print", rig_, kNudgePx), looks_(fabric_, 3) {}
+  CheckCaptureCase() : looks_(fabric_, 3) {}
   CaptureCheck Check(const FrameCheckOptions& options = {}) {
     return CheckCapture(rig_, looks_.Looks(), options);
   }
   Rig rig_ = CalibratedRig();
-  Fabric fabric_;
+  inline static const Fabric fabric_ = Fabric("print", CalibratedRig(), kNudgePx);  // for all cases
   SessionLooks looks_;
 };
 
@@ -222,6 +224,56 @@ TEST_F(CheckCaptureCase, SaysWhatItCannotTell) {
   EXPECT_THAT(check.faults, IsEmpty());
   ASSERT_THAT(check.notes, SizeIs(1));
   EXPECT_THAT(check.notes[0], HasSubstr("swapped lights are not found"));
+}
+
+// The same through files: RAW as the camera's, read and checked one by one, then together.
+class CheckRawFrames : public ::testing::Test {
+ protected:
+  FrameLook Look(const Image3& radiance, const std::string& name, FrameRole role) {
+    Sensor sensor = *SensorNamed("nikon-d5100");
+    sensor.full_scale = 1.5;
+    const Image<uint16_t> mosaic = *Expose(sensor, radiance, HashOf(5, looks_.size()));
+    const std::filesystem::path path = temp_.Path() / (name + ".dng");
+    EXPECT_TRUE(WriteDng(path, mosaic,
+                         {.cfa = sensor.cfa,
+                          .black = sensor.black_dn,
+                          .white = sensor.white_dn,
+                          .exposure_s = 0.1}));
+    const Result<FrameLook> look =
+        CheckFrame({.path = path, .exposure = 0.1}, rig_, {.exposure_s = 0.1}, role, {});
+    EXPECT_TRUE(look) << look.error().message;
+    return look.value_or(FrameLook());
+  }
+  CaptureCheck Check(const std::vector<Image3>& lit, const Image3& repeat, const Image3& dark) {
+    looks_.clear();
+    for (size_t k = 0; k < lit.size(); ++k) {
+      looks_.push_back(Look(lit[k], fmt::format("{}", k), FrameRole::kLit));
+    }
+    const FrameLook dark_look = Look(dark, "dark", FrameRole::kDark);
+    const FrameLook repeat_look = Look(repeat, "again", FrameRole::kRepeat);
+    CaptureLooks looks{.dark_first = &dark_look, .dark_last = &dark_look, .repeat = &repeat_look};
+    for (const FrameLook& look : looks_) {
+      looks.lit.push_back(&look);
+    }
+    return CheckCapture(rig_, looks, {});
+  }
+  testing::TempFolder temp_;
+  Rig rig_ = CalibratedRig();
+  std::vector<FrameLook> looks_;
+};
+
+TEST_F(CheckRawFrames, FindTheSame) {
+  const Fabric fabric("knit", rig_, kNudgePx);
+  EXPECT_EQ(WordsOf(Check(fabric.lit, fabric.lit[0], fabric.dark)), " nothing");
+  std::vector<Image3> nudged = fabric.lit;
+  std::copy(fabric.nudged.begin() + 6, fabric.nudged.end(), nudged.begin() + 6);
+  EXPECT_THAT(WordsOf(Check(nudged, fabric.nudged[0], fabric.dark)),
+              ::testing::AllOf(HasSubstr("has moved by 3."),
+                               HasSubstr("from the frame of light 'led-6' on")));
+  std::vector<Image3> shaded = fabric.lit;
+  shaded[4] = testing::PassersShadow(3).On(shaded[4]);
+  EXPECT_THAT(WordsOf(Check(shaded, fabric.lit[0], fabric.dark)),
+              HasSubstr("a shadow lies on the frame of light 'led-4'"));
 }
 
 TEST(FrameCheckOptions, NamesWhatIsOutOfRange) {

@@ -121,6 +121,7 @@ struct Fabric {
   }
   static Scene WithShadows(Scene scene) {
     scene.illumination.shadows = Shadows::kCast;
+    scene.illumination.shadow_samples = 1;
     scene.lens.psf_sigma_px = 0.8;  // or yarns of a few pixels would alias
     scene.lens.samples = 3;         // or an edge of a print could move by whole pixels only
     return scene;
@@ -143,8 +144,8 @@ inline Image3 Mixed(const Image3& a, float by, const Image3& b, float times) {
 
 // A look of a mosaic as fractions of the range.
 inline FrameLook LookOf(const Image<float>& mosaic, const std::array<uint8_t, 4>& cfa) {
-  FrameLook look{.means = {.size_px = mosaic.Size(), .grid = kLookGrid},
-                 .middle = Image<float>(mosaic.width / 2, mosaic.height / 2)};
+  FrameLook look{.means = {.size_px = mosaic.Size(), .grid = kLookGrid}};
+  AddToMiddle(mosaic, 1.0F, 1.0, look.middle);
   look.means.blocks.resize(static_cast<size_t>(kLookGrid.columns) *
                            static_cast<size_t>(kLookGrid.rows));
   for (int y = 0; y < mosaic.height; ++y) {
@@ -155,7 +156,6 @@ inline FrameLook LookOf(const Image<float>& mosaic, const std::array<uint8_t, 4>
                         x * kLookGrid.columns / mosaic.width;
       look.means.blocks[static_cast<size_t>(block)].radiance_rgb[colour] +=
           static_cast<double>(value);
-      look.middle.At(x / 2, y / 2) += value;
     }
   }
   return look;
