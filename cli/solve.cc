@@ -30,6 +30,9 @@ ReadCaptureOptions ReadOptionsOf(const SolveArgs& args) {
   if (!args.mask_file.empty()) {
     options.mask_file = args.mask_file;
   }
+  if (!args.truth_dir.empty()) {
+    options.truth_dir = args.truth_dir;
+  }
   return options;
 }
 
@@ -113,7 +116,7 @@ Status CheckSupported(const SolveArgs& args, Capture& capture) {
   if (args.fail_above_deg && !capture.truth) {
     return Fail(ErrorCode::kBadData,
                 "{}: the capture has no truth; --fail-above needs truth/normal.exr, normal_gt.exr "
-                "or Normal_gt.mat",
+                "or Normal_gt.mat, or --truth",
                 args.capture.string());
   }
   if (args.undistort && !capture.rig.camera) {
@@ -257,6 +260,10 @@ void AddSolve(CLI::App& root, SolveArgs& args) {
   cmd->add_option("--rig", args.rig_file, "rig.json to use instead of the capture's own lights");
   cmd->add_option("--mask", args.mask_file,
                   "Image that is white where to solve, instead of the capture's own mask");
+  cmd->add_option(
+      "--truth", args.truth_dir,
+      "Simulated session whose truth this capture is compared with: DIR/truth/normal.exr "
+      "and albedo.exr");
   cmd->add_option("--lights", args.read.lights, "Use only these lights, by index: 0,10,20")
       ->delimiter(',')
       ->allow_extra_args(false);  // or it would take the capture for a light

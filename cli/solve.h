@@ -20,6 +20,7 @@ struct SolveArgs {
   ReadCaptureOptions read;
   std::string rig_file;   // empty: the capture's own
   std::string mask_file;  // empty: the capture's own
+  std::string truth_dir;  // empty: what lies beside the capture
   std::string encoding = "auto";
   std::string backend = "auto";
   std::string robust = "none";

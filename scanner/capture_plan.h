@@ -1,5 +1,6 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <filesystem>
 #include <map>
 #include <optional>
@@ -20,14 +21,18 @@ struct FrameFile {
   std::optional<std::string> sha256;  // what the session recorded
   // Of the rig that the frame is read for: how its readings become balanced radiance.
   std::optional<Response> response = std::nullopt;
+  // How its picture lies against that of the first light's frame: what is at x there is at x + shift.
+  Eigen::Vector2d shift_px = Eigen::Vector2d::Zero();
 };
+
+// The lit frames of one light: one, or several of different exposures, the longest first.
+using LightFiles = std::vector<FrameFile>;
 
 // What a layout says about a capture, before any pixel is read.
 struct CapturePlan {
   std::string layout;
   Rig rig;
-  // One for each light of the rig, in its order; nothing where the session has no frame of it.
-  std::vector<std::optional<FrameFile>> lit;
+  std::vector<LightFiles> lit;  // [light of the rig]; empty where the session has no frame of it
   std::vector<FrameFile> dark;
   std::optional<std::filesystem::path> mask;
   bool mask_is_shared = false;  // it lies one folder up: left out where its size does not fit

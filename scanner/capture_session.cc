@@ -382,7 +382,8 @@ Result<CaptureSummary> CaptureSession::Run(LightBoard& board, TetheredCamera& ca
     }
     // A light that missed its cue may keep it the next time; nothing else mends itself.
     const bool may_mend = std::ranges::all_of(check->faults, [](const CaptureFault& fault) {
-      return fault.kind == CaptureFaultKind::kDark || fault.kind == CaptureFaultKind::kLevel;
+      return fault.kind == CaptureFaultKind::kDark || fault.kind == CaptureFaultKind::kLevel ||
+             fault.kind == CaptureFaultKind::kShaded;
     });
     if (!may_mend || round == kRounds) {
       std::string text;

@@ -5,10 +5,13 @@
 #include <nlohmann/json.hpp>
 #include <numeric>
 
+#include "scanner/frame_compare.h"
+
 namespace sateen {
 namespace {
 
-constexpr double kDoubled = 1.4;  // a level from which on another light may be on too
+constexpr double kFitsAsWell = 5.0;  // times the usual misfit of a frame at its own light
+constexpr double kDoubled = 1.4;     // a level from which on another light may be on too
 
 using Field = std::vector<double>;  // one value a block
 
@@ -60,9 +63,15 @@ class CaptureChecker {
     if (!check_.faults.empty()) {
       return std::move(check_);  // what every frame suffers from would look like faults of lights
     }
-    CheckLevels();
+    FindDark();
     CheckPatterns();
-    CheckShift();
+    if (check_.faults.empty()) {
+      CheckShifts();
+    }
+    if (check_.faults.empty()) {
+      CheckShades();
+    }
+    CheckLevels();
     if (check_.faults.empty() && std::abs(check_.drift) > options_.max_drift) {
       check_.notes.push_back(fmt::format(
           "light '{}' is {:+.1f} % brighter at the end than at the start; let the lights warm up",
@@ -125,30 +134,21 @@ class CaptureChecker {
     }
   }
 
-  // A first light that is not what it should be cannot be laid over its repeat.
-  void CheckShift() {
-    const bool first_is_wrong = std::ranges::any_of(check_.faults, [](const CaptureFault& fault) {
-      return std::ranges::find(fault.lights, std::size_t{0}) != fault.lights.end();
-    });
-    if (first_is_wrong) {
-      return;
-    }
-    const Shift shift = ShiftBetween(looks_.lit[0]->middle, looks_.repeat->middle);
-    if (shift.peak < options_.min_shift_peak) {
+  void CheckShifts() {
+    check_.shifts = ShiftsOf(rig_, looks_, on_, options_);
+    if (check_.shifts.empty()) {
       check_.notes.emplace_back(
           "too little texture to tell whether the camera has moved meanwhile");
-      return;
+    } else if (std::optional<CaptureFault> moved = MovedFault(rig_, check_.shifts, options_)) {
+      check_.faults.push_back(*std::move(moved));
     }
-    check_.shift = shift;
-    if (shift.px.norm() > options_.max_shift_px) {
-      check_.faults.push_back(
-          {.kind = CaptureFaultKind::kMoved,
-           .text = fmt::format(
-               "the picture has moved by {:.1f} px ({:+.1f} right, {:+.1f} down) between the first "
-               "frame of light '{}' and its second; at most {:g} px may be: make camera and fabric "
-               "fast, check the calibration, and capture every frame again",
-               shift.px.norm(), shift.px.x(), shift.px.y(), rig_.lights[0].name,
-               options_.max_shift_px)});
+  }
+
+  // A shaded light is no other one, nor dim.
+  void CheckShades() {
+    for (CaptureFault& fault : ShadedFaults(rig_, looks_, signal_, on_, options_)) {
+      is_shaded_[fault.lights[0]] = true;
+      check_.faults.push_back(std::move(fault));
     }
   }
 
@@ -166,28 +166,35 @@ class CaptureChecker {
     check_.faults.push_back({.kind = kind, .lights = std::move(lights), .text = std::move(text)});
   }
 
-  void CheckLevels() {
-    const double change =
-        LightsAreCalibrated(rig_) ? options_.max_level_change : options_.max_rough_level_change;
+  void FindDark() {
     on_.assign(signal_.size(), true);
+    is_shaded_.assign(signal_.size(), false);
     for (size_t k = 0; k < signal_.size(); ++k) {
       const double level = check_.levels[k];
-      const std::string& name = rig_.lights[k].name;
       if (!(level >= options_.min_level)) {  // also NaN
         on_[k] = false;
         AddFault(CaptureFaultKind::kDark, {k},
                  fmt::format("light '{}' was not on: its frame has {:.0f} % of the light that the "
                              "rig says; check its cable: sateen light {}",
-                             name, 100.0 * level, rig_.lights[k].channel));
+                             rig_.lights[k].name, 100.0 * level, rig_.lights[k].channel));
       } else if (level > kDoubled) {
         on_[k] = false;
-      } else if (std::abs(level - 1.0) > change) {
+      }
+    }
+  }
+
+  void CheckLevels() {
+    const double change =
+        LightsAreCalibrated(rig_) ? options_.max_level_change : options_.max_rough_level_change;
+    for (size_t k = 0; k < signal_.size(); ++k) {
+      const double level = check_.levels[k];
+      if (on_[k] && !is_shaded_[k] && std::abs(level - 1.0) > change) {
         AddFault(
             CaptureFaultKind::kLevel, {k},
             fmt::format("light '{}' has {:.0f} % of the light that the rig says, against the "
                         "others; at most {:.0f} % may be between: check the light and what may "
                         "shade it, or calibrate anew",
-                        name, 100.0 * level, 100.0 * change));
+                        rig_.lights[k].name, 100.0 * level, 100.0 * change));
       }
     }
     for (size_t k = 0; k < signal_.size(); ++k) {
@@ -201,22 +208,25 @@ class CaptureChecker {
     }
   }
 
-  // Mean log of all lights that are on, block by block.
-  [[nodiscard]] Field MeanLog(const std::vector<Field>& all) const {
-    Field mean(all[0].size());
-    const auto share = 1.0 / static_cast<double>(std::ranges::count(on_, true));
-    for (size_t k = 0; k < all.size(); ++k) {
-      for (size_t b = 0; b < mean.size() && on_[k]; ++b) {
-        mean[b] += share * std::log(all[k][b]);
+  // Median log of all lights that are on, block by block: one shaded frame must not bend the others.
+  [[nodiscard]] Field MedianLog(const std::vector<Field>& all) const {
+    Field median;
+    for (size_t b = 0; b < all[0].size(); ++b) {
+      std::vector<double> logs;
+      for (size_t k = 0; k < all.size(); ++k) {
+        if (on_[k]) {
+          logs.push_back(std::log(std::max(all[k][b], 1e-30)));
+        }
       }
+      median.push_back(Median(std::move(logs)));
     }
-    return mean;
+    return median;
   }
 
   // (3); not finite where a value is not above 0.
-  static Field Pattern(Field field, const Field& mean_log) {
-    std::ranges::transform(field, mean_log, field.begin(),
-                           [](double value, double mean) { return std::log(value) - mean; });
+  static Field Pattern(Field field, const Field& median_log) {
+    std::ranges::transform(field, median_log, field.begin(),
+                           [](double value, double median) { return std::log(value) - median; });
     return field;
   }
 
@@ -241,14 +251,14 @@ class CaptureChecker {
     if (!has_pattern_) {
       return "";
     }
-    const Field q = Pattern(signal_[k], MeanLog(signal_));
-    const Field mean_predicted = MeanLog(predicted_);
+    const Field q = Pattern(signal_[k], MedianLog(signal_));
+    const Field median_predicted = MedianLog(predicted_);
     size_t best = k;
     double least = 0.0;
     for (size_t j = 0; j < predicted_.size(); ++j) {
       Field both = predicted_[k];
       std::ranges::transform(both, predicted_[j], both.begin(), std::plus<>());
-      const double misfit = Misfit(q, Pattern(both, mean_predicted));
+      const double misfit = Misfit(q, Pattern(both, median_predicted));
       if (j != k && (best == k || misfit < least)) {
         best = j;
         least = misfit;
@@ -257,38 +267,56 @@ class CaptureChecker {
     return best == k ? "" : fmt::format(", as if light '{}' were on too", rig_.lights[best].name);
   }
 
+  // Misfit (4) of a frame at its own light, and at the light where it is least.
+  struct Fit {
+    double own = 0.0;
+    double least = 0.0;
+    size_t best = 0;
+  };
+
+  static Fit FitOf(size_t k, const Field& q, const std::vector<Field>& patterns) {
+    const double own = Misfit(q, patterns[k]);
+    Fit fit{.own = own, .least = own, .best = k};
+    for (size_t j = 0; j < patterns.size(); ++j) {
+      const double misfit = Misfit(q, patterns[j]);
+      if (misfit < fit.least) {
+        fit.best = j;
+        fit.least = misfit;
+      }
+    }
+    return fit;
+  }
+
   void CheckPatterns() {
     if (!has_pattern_ || std::ranges::count(on_, true) < 2) {
       return;
     }
-    const Field mean_signal = MeanLog(signal_);
-    const Field mean_predicted = MeanLog(predicted_);
+    const Field median_signal = MedianLog(signal_);
+    const Field median_predicted = MedianLog(predicted_);
     std::vector<Field> patterns;
     for (const Field& field : predicted_) {
-      patterns.push_back(Pattern(field, mean_predicted));
+      patterns.push_back(Pattern(field, median_predicted));
     }
+    std::vector<Fit> fits(signal_.size());
+    std::vector<double> own;
     for (size_t k = 0; k < signal_.size(); ++k) {
-      if (!on_[k]) {
-        continue;
+      if (on_[k]) {
+        fits[k] = FitOf(k, Pattern(signal_[k], median_signal), patterns);
+        own.push_back(fits[k].own);
       }
-      const Field q = Pattern(signal_[k], mean_signal);
-      const double own = Misfit(q, patterns[k]);
-      size_t best = k;
-      double least = own;
-      for (size_t j = 0; j < patterns.size(); ++j) {
-        const double misfit = Misfit(q, patterns[j]);
-        if (misfit < least) {
-          best = j;
-          least = misfit;
-        }
-      }
-      if (best != k && least < options_.other_light_misfit * own) {
+    }
+    const double usual = Median(own);
+    for (size_t k = 0; k < signal_.size(); ++k) {
+      const Fit& fit = fits[k];
+      // A shaded frame fits no light; a frame of another light fits that one as well as others theirs.
+      if (on_[k] && fit.best != k && fit.least < options_.other_light_misfit * fit.own &&
+          fit.least < kFitsAsWell * usual) {
         AddFault(
             CaptureFaultKind::kOtherLight, {k},
             fmt::format("the frame of light '{}' is lit from where the rig has light '{}'; are "
                         "they swapped? Check the channels of both ({} and {})",
-                        rig_.lights[k].name, rig_.lights[best].name, rig_.lights[k].channel,
-                        rig_.lights[best].channel));
+                        rig_.lights[k].name, rig_.lights[fit.best].name, rig_.lights[k].channel,
+                        rig_.lights[fit.best].channel));
       }
     }
   }
@@ -300,6 +328,7 @@ class CaptureChecker {
   std::vector<Field> signal_;     // s of (1)
   std::vector<Field> predicted_;  // E of (1)
   std::vector<bool> on_;          // one light, alone
+  std::vector<bool> is_shaded_;
   CaptureCheck check_;
 };
 
@@ -318,7 +347,7 @@ Status FrameCheckOptions::Validate() const {
         Range{"other_light_misfit", other_light_misfit, 1.0},
         Range{"max_ambient", max_ambient, 1.0}, Range{"max_drift", max_drift, 1.0},
         Range{"max_shift_px", max_shift_px, 100.0}, Range{"min_shift_peak", min_shift_peak, 1.0},
-        Range{"max_exposure_error", max_exposure_error, 1.0}}) {
+        Range{"min_shade", min_shade, 1.0}, Range{"max_exposure_error", max_exposure_error, 1.0}}) {
     if (!(value > 0.0 && value <= most)) {
       return Fail(ErrorCode::kInvalidArgument, "{} is {}; need more than 0 and at most {:g}", name,
                   value, most);

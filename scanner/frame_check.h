@@ -10,6 +10,7 @@
 #include "rig/rig.h"
 #include "scanner/block_means.h"
 #include "scanner/capture_plan.h"
+#include "scanner/frame_registration.h"
 #include "scanner/tethered_camera.h"
 
 namespace sateen {
@@ -32,8 +33,10 @@ struct FrameCheckOptions {
   double max_drift = 0.03;
   // How far the picture may have moved meanwhile. (0, 100] px
   double max_shift_px = 1.0;
-  // Correlation of first frame and repeat below which a shift cannot be told. (0, 1)
+  // Correlation of first frame and repeat below which shifts cannot be told. (0, 1)
   double min_shift_peak = 0.1;
+  // Least share of the light that a shadow on part of one frame takes to be found. (0, 1)
+  double min_shade = 0.1;
   // Most that an exposure in a file may differ from the camera's word. (0, 1)
   double max_exposure_error = 0.1;
 
@@ -44,9 +47,24 @@ struct FrameCheckOptions {
 // What the checks keep of a frame.
 struct FrameLook {
   BlockMeans means;
-  // Middle of the picture for the shift: cells of 2 x 2 sites or pixels, at most 512 x 512 of them.
+  // Middle of the picture for the shift (AddToMiddle).
   Image<float> middle;
 };
+
+struct PixelPlace {
+  int x = 0;
+  int y = 0;
+};
+
+// Where the first cell of the middle of a picture lies in it. [px]
+[[nodiscard]] PixelPlace OriginOfMiddle(ImageSize size_px, ImageSize cells);
+
+/// Adds the middle of a plane to one of radiance, made where it is empty: cells 2 sites apart, at most
+/// 512 x 512 of them. Each is the mean of 4 x 4 sites by the weights 1, 3, 3, 1 along both sides, which
+/// count every colour of a mosaic alike, and which let pass less of what is finer than the cells and
+/// would not move with the picture; not finite where one of them is saturated.
+void AddToMiddle(const Image<float>& plane, float saturation, double exposure,
+                 Image<float>& middle);
 
 /// Reads a frame and checks what can be told of it alone: it decodes, has the size of the rig's
 /// camera, the exposure that the camera confirmed where the file says one, and is not clipped.
@@ -57,18 +75,12 @@ struct FrameLook {
                                            const ExposureSettings& settings, FrameRole role,
                                            const FrameCheckOptions& options);
 
-enum class CaptureFaultKind { kDark, kLevel, kOtherLight, kAmbient, kMoved };
+enum class CaptureFaultKind { kDark, kLevel, kOtherLight, kAmbient, kMoved, kShaded };
 
 struct CaptureFault {
   CaptureFaultKind kind = CaptureFaultKind::kDark;
   std::vector<std::size_t> lights;  // of the rig; empty: every frame is concerned
   std::string text;                 // what was found, and what to do
-};
-
-// How far the second picture lies from the first, and how sure that is: the correlation there, 1 at most.
-struct Shift {
-  Eigen::Vector2d px = Eigen::Vector2d::Zero();
-  double peak = 0.0;
 };
 
 struct CaptureCheck {
@@ -77,7 +89,9 @@ struct CaptureCheck {
   std::vector<double> levels;      // of each light, of what the rig says, over their median
   double ambient = 0.0;            // change of the dark, of the lit frames' brightness
   double drift = 0.0;              // of the first light
-  std::optional<Shift> shift;      // nothing where it cannot be told
+  // Of each light's frame against the first light's, and of the repeat last; empty where they cannot
+  // be told. What IsSignificant() of them goes into the session as shift_px.
+  std::vector<Shift> shifts;
 };
 
 // The frames of a capture, in the roles that they have for the checks.
@@ -92,21 +106,19 @@ struct CaptureLooks {
 ///
 ///     s_kb = i_kb - dark_b,   E_kb = e_k (n . l_k) at the block's place on the table          (1)
 ///     level_k = sum_b s_kb / sum_b E_kb,  over its median                 (2)
-///     q_kb = log s_kb - mean_j log s_jb,   r_kb = log E_kb - mean_j log E_jb                  (3)
+///     q_kb = log s_kb - med_j log s_jb,   r_kb = log E_kb - med_j log E_jb                    (3)
 ///     misfit_kj = var_b (q_kb - r_jb)                                                         (4)
 ///
-/// The mean over lights in (3) takes the texture of a fabric out; it runs over the lights that are on,
-/// so that lights that have changed places do not disturb it. A light that is off has a level below
-/// min_level; two that are on together have one too high; lights that have changed places have the
-/// least misfit at another light than their own. Levels are only checked of a rig whose lights have
-/// been calibrated, patterns only where the camera has a pose and the lights are no distant ones.
+/// The median over lights in (3) takes the texture of a fabric out; it runs over the lights that are
+/// on, so that lights that have changed places do not disturb it. A light that is off has a level
+/// below min_level; two that are on together have one too high; lights that have changed places have
+/// the least misfit at another light than their own, as little as other frames at theirs. Levels are
+/// only checked of a rig whose lights have been calibrated, patterns only where the camera has a pose
+/// and the lights are no distant ones.
 /// The dark at the end against the dark at the start tells of ambient light, the first light again of
-/// drift (its sum over blocks) and of a camera or a fabric that has moved (ShiftBetween).
+/// drift (its sum over blocks). All frames are laid over the first (RegisterFrames), and what lies on
+/// one frame alone is looked for (FindShades), once the lights are those that the rig says.
 [[nodiscard]] CaptureCheck CheckCapture(const Rig& rig, const CaptureLooks& looks,
                                         const FrameCheckOptions& options);
-
-/// Where the second picture lies against the first: the highest cross-correlation of both, less their
-/// Gaussian blur, over all shifts, and the top of the parabola through it and its neighbours.
-[[nodiscard]] Shift ShiftBetween(const Image<float>& first, const Image<float>& second);
 
 }  // namespace sateen

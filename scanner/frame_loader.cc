@@ -4,94 +4,25 @@
 
 #include "core/parallel.h"
 #include "core/sha256.h"
-#include "imaging/raw.h"
-#include "scanner/sensor_reading.h"
+#include "scanner/frame_shift.h"
+#include "scanner/light_reader.h"
 
 namespace sateen {
 namespace {
-
-constexpr float kSaturatedSite = 8.0F;  // times the reading at which the last channel saturates
-
-struct LoadedFrame {
-  LightFrame frame;
-  bool was_srgb = false;
-  std::string sha256;
-};
-
-// In their own channel, saturated samples of a balanced photo are put at its full scale.
-void Balance(const SensorReading& reading, Photo& photo) {
-  const float top = photo.saturation ? *photo.saturation * reading.Largest() : 0.0F;
-  for (size_t c = 0; c < 3; ++c) {
-    for (float& value : photo.rgb[c].pixels) {
-      value = photo.saturation && value >= *photo.saturation ? top : reading.Value(value, c);
-    }
-  }
-  if (photo.saturation) {
-    photo.saturation = top;
-  }
-}
-
-Result<Photo> ReadPhotoOrRaw(const FrameFile& file, Encoding encoding) {
-  if (!IsRawName(file.path)) {
-    return ReadPhoto(file.path, encoding).map([&](Photo photo) {
-      Balance(ReadingOf(file), photo);
-      return photo;
-    });
-  }
-  return ReadRawMosaic(file.path).and_then([&](RawMosaic mosaic) {
-    return ReadingOf(file, mosaic).map([&](const SensorReading& reading) {
-      // A saturated site must not pass as a mean of it and its neighbours: whatever pixel it has a
-      // part in, at least a quarter, comes out above the level of saturation.
-      const float top = reading.FullScale();
-      for (int y = 0; y < mosaic.samples.height; ++y) {
-        for (int x = 0; x < mosaic.samples.width; ++x) {
-          float& site = mosaic.samples.At(x, y);
-          const size_t colour = mosaic.cfa[static_cast<size_t>(y % 2 * 2 + x % 2)];
-          site = site >= reading.saturation ? kSaturatedSite * top : reading.Value(site, colour);
-        }
-      }
-      return Photo{Demosaic(mosaic), top, false};
-    });
-  });
-}
-
-// Equation (1) without the dark frames.
-Result<LoadedFrame> LoadFrame(const FrameFile& file, Encoding encoding) {
-  Result<std::string> hash = CheckedHash(file);
-  if (!hash) {
-    return tl::unexpected(hash.error());
-  }
-  Result<Photo> photo = ReadPhotoOrRaw(file, encoding);
-  if (!photo) {
-    return tl::unexpected(photo.error());
-  }
-  LoadedFrame loaded;
-  loaded.frame.rgb = std::move(photo->rgb);
-  loaded.frame.name = file.path.string();
-  loaded.was_srgb = photo->was_srgb;
-  loaded.sha256 = *std::move(hash);
-  const auto per_exposure = static_cast<float>(1.0 / file.exposure);
-  if (photo->saturation) {
-    loaded.frame.full_scale = *photo->saturation * per_exposure;
-  }
-  for (Image<float>& plane : loaded.frame.rgb.planes) {
-    for (float& value : plane.pixels) {
-      value *= per_exposure;
-    }
-  }
-  return loaded;
-}
 
 // Adds up one by one, in their order: memory for one dark frame, and the same bits every time.
 Result<Image3> MeanDark(const std::vector<FrameFile>& dark, Encoding encoding, ImageSize size_px,
                         const Task& task, LoadedFrames& result) {
   Image3 mean(size_px);
-  const float weight = 1.0F / static_cast<float>(dark.size());
+  double sum = 0.0;
+  for (const FrameFile& file : dark) {
+    sum += file.exposure * file.exposure;
+  }
   for (const FrameFile& file : dark) {
     if (const Status status = task.CheckCancelled(); !status) {
       return tl::unexpected(status.error());
     }
-    const Result<LoadedFrame> loaded = LoadFrame(file, encoding);
+    const Result<LightReading> loaded = ReadLight({file}, encoding);
     if (!loaded) {
       return tl::unexpected(loaded.error());
     }
@@ -99,12 +30,13 @@ Result<Image3> MeanDark(const std::vector<FrameFile>& dark, Encoding encoding, I
     if (const Status status = CheckSize(loaded->frame.name, rgb.Size(), size_px); !status) {
       return tl::unexpected(status.error());
     }
+    const auto weight = static_cast<float>(file.exposure * file.exposure / sum);
     for (size_t c = 0; c < 3; ++c) {
       for (size_t p = 0; p < mean[c].pixels.size(); ++p) {
         mean[c].pixels[p] += weight * rgb[c].pixels[p];
       }
     }
-    result.sha256_of_input[loaded->frame.name] = loaded->sha256;
+    result.sha256_of_input.insert(loaded->sha256_of_input.begin(), loaded->sha256_of_input.end());
     task.Advance();
   }
   return mean;
@@ -120,8 +52,8 @@ void Subtract(const Image3& dark, LightFrame& frame) {
 }
 
 // Moves the frames into `result`; the first failure in their order is the error.
-Status Collect(std::vector<Result<LoadedFrame>>& frames, LoadedFrames& result) {
-  for (Result<LoadedFrame>& loaded : frames) {
+Status Collect(std::vector<Result<LightReading>>& frames, LoadedFrames& result) {
+  for (Result<LightReading>& loaded : frames) {
     if (!loaded) {
       return tl::unexpected(loaded.error());
     }
@@ -132,7 +64,7 @@ Status Collect(std::vector<Result<LoadedFrame>>& frames, LoadedFrames& result) {
       return status;
     }
     result.srgb_count += loaded->was_srgb ? 1 : 0;
-    result.sha256_of_input[frame.name] = loaded->sha256;
+    result.sha256_of_input.merge(loaded->sha256_of_input);
   }
   return {};
 }
@@ -159,15 +91,15 @@ Status CheckSize(const std::string& what, ImageSize size, ImageSize frame_size) 
               size.width, size.height, frame_size.width, frame_size.height);
 }
 
-Result<LoadedFrames> LoadFrames(const std::vector<FrameFile>& lit,
+Result<LoadedFrames> LoadFrames(const std::vector<LightFiles>& lit,
                                 const std::vector<FrameFile>& dark, Encoding encoding,
                                 const Task& task) {
   const auto count = static_cast<int>(lit.size());
   task.BeginStage("reading", count + static_cast<int>(dark.size()));
-  std::vector<Result<LoadedFrame>> frames(lit.size());
+  std::vector<Result<LightReading>> frames(lit.size());
   const Status ran = ParallelFor(count, 1, task, [&](int begin, int) {
     const auto k = static_cast<size_t>(begin);
-    frames[k] = LoadFrame(lit[k], encoding);
+    frames[k] = ReadLight(lit[k], encoding);
   });
   if (!ran) {
     return tl::unexpected(ran.error());
@@ -176,15 +108,24 @@ Result<LoadedFrames> LoadFrames(const std::vector<FrameFile>& lit,
   if (const Status status = Collect(frames, result); !status) {
     return tl::unexpected(status.error());
   }
-  if (dark.empty()) {
-    return result;
+  Image3 mean;
+  if (!dark.empty()) {
+    Result<Image3> of_dark = MeanDark(dark, encoding, result.stack[0].rgb.Size(), task, result);
+    if (!of_dark) {
+      return tl::unexpected(of_dark.error());
+    }
+    mean = *std::move(of_dark);
   }
-  const Result<Image3> mean = MeanDark(dark, encoding, result.stack[0].rgb.Size(), task, result);
-  if (!mean) {
-    return tl::unexpected(mean.error());
-  }
-  for (LightFrame& frame : result.stack) {
-    Subtract(*mean, frame);
+  const Task silent{.threads = task.threads, .progress = nullptr, .cancel = task.cancel};
+  const Status finished = ParallelFor(count, 1, silent, [&](int begin, int) {
+    const auto k = static_cast<size_t>(begin);
+    if (!dark.empty()) {
+      Subtract(mean, result.stack[k]);
+    }
+    LayOverFirst(lit[k].front().shift_px, result.stack[k]);  // the dark is the sensor's and stays
+  });
+  if (!finished) {
+    return tl::unexpected(finished.error());
   }
   return result;
 }

@@ -23,14 +23,24 @@ struct LoadedFrames {
 ///
 ///     i_k = v_k / H_k - mean_d(v_d / H_d),    full_scale_k = saturation_k / H_k            (1)
 ///
-/// v is the file's value, balanced by the rig's response (scanner/sensor_reading.h), H its exposure. A sample that is saturated before the subtraction stays
-/// at full_scale, so that a bright dark frame cannot hide that it is. At least one lit frame.
+/// v is the file's value, balanced by the rig's response (scanner/sensor_reading.h), H its exposure.
+/// The mean of the dark is weighted by H_d^2, because a dark frame's noise is that of the read-out. A
+/// sample that is saturated before the subtraction stays at full_scale, so that a bright dark frame
+/// cannot hide that it is.
+///
+/// Several exposures of a light are merged (scanner/exposure_merge.h), camera RAW site by site: a site
+/// saturates alone, and a demosaiced pixel would carry it into its neighbours. full_scale is then that
+/// of the shortest. A frame whose file has a shift_px is laid over the first (scanner/frame_shift.h).
+///
+/// At least one light, each with at least one frame.
+/// Memory   K images, and for each thread five planes more, however many exposures there are
 ///
 /// Errors   kIo: a file is absent or unreadable
 ///          kBadData: a file is no image, has another hash than recorded, or another size than the
-///          first lit frame; the first such file in the order given is named
+///          first lit frame; the first such file in the order given is named; RAW and other files
+///          of one light
 ///          kCancelled
-[[nodiscard]] Result<LoadedFrames> LoadFrames(const std::vector<FrameFile>& lit,
+[[nodiscard]] Result<LoadedFrames> LoadFrames(const std::vector<LightFiles>& lit,
                                               const std::vector<FrameFile>& dark, Encoding encoding,
                                               const Task& task);
 

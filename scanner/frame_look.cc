@@ -1,20 +1,20 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <opencv2/core.hpp>
-#include <opencv2/imgproc.hpp>
+#include <limits>
 #include <utility>
 
 #include "imaging/image_io.h"
 #include "imaging/raw.h"
 #include "scanner/frame_check.h"
+#include "scanner/sensor_reading.h"
 
 namespace sateen {
 namespace {
 
 constexpr BlockGrid kCheckGrid = {.columns = 24, .rows = 16};
-constexpr int kSitesOfBlock = 4;     // fewest, along each side
-constexpr int kMiddleCells = 512;    // along each side of the middle, at most
-constexpr double kHighPassPx = 3.0;  // standard deviation of what is taken out
+constexpr int kSitesOfBlock = 4;   // fewest, along each side
+constexpr int kMiddleCells = 512;  // along each side of the middle, at most
 
 // The grid of the checks, or as much of it as a small picture has room for.
 BlockGrid GridOf(const Rig& rig) {
@@ -26,94 +26,59 @@ BlockGrid GridOf(const Rig& rig) {
           .rows = std::clamp(size.height / kSitesOfBlock, 1, kCheckGrid.rows)};
 }
 
-// Cells of 2 x 2 of the middle of a plane.
-void AddMiddle(const Image<float>& plane, Image<float>& middle) {
-  const int width = std::min(plane.width / 2, kMiddleCells);
-  const int height = std::min(plane.height / 2, kMiddleCells);
-  if (middle.pixels.empty()) {
-    middle = Image<float>(width, height);
-  }
-  // Even, so that the colours of a mosaic keep their places.
-  const int left = (plane.width / 2 - width) / 2 * 2;
-  const int top = (plane.height / 2 - height) / 2 * 2;
-  for (int y = 0; y < height; ++y) {
-    for (int x = 0; x < width; ++x) {
-      const int u = left + 2 * x;
-      const int v = top + 2 * y;
-      middle.At(x, y) +=
-          plane.At(u, v) + plane.At(u + 1, v) + plane.At(u, v + 1) + plane.At(u + 1, v + 1);
-    }
-  }
-}
-
-Result<Image<float>> ReadMiddle(const std::filesystem::path& path) {
+Result<Image<float>> ReadMiddle(const FrameFile& file) {
   Image<float> middle;
-  if (IsRawName(path)) {
-    return ReadRawMosaic(path).map([&](const RawMosaic& mosaic) {
-      AddMiddle(mosaic.samples, middle);
-      return std::move(middle);
+  if (IsRawName(file.path)) {
+    return ReadRawMosaic(file.path).and_then([&](const RawMosaic& mosaic) {
+      return ReadingOf(file, mosaic).map([&](const SensorReading& reading) {
+        AddToMiddle(mosaic.samples, reading.saturation, file.exposure, middle);
+        return std::move(middle);
+      });
     });
   }
-  return ReadPhoto(path).map([&](const Photo& photo) {
+  return ReadPhoto(file.path).map([&](const Photo& photo) {
     for (const Image<float>& plane : photo.rgb.planes) {
-      AddMiddle(plane, middle);
+      AddToMiddle(plane, photo.saturation.value_or(std::numeric_limits<float>::infinity()),
+                  file.exposure, middle);
     }
     return std::move(middle);
   });
 }
 
-// Texture alone, fading out towards the border, which wraps around.
-cv::Mat HighPassed(const Image<float>& image) {
-  cv::Mat values(image.height, image.width, CV_32F);
-  std::ranges::copy(image.pixels, values.begin<float>());
-  cv::Mat smooth;
-  cv::GaussianBlur(values, smooth, cv::Size(), kHighPassPx);
-  cv::Mat high;
-  cv::Mat(values - smooth).convertTo(high, CV_64F);
-  cv::Mat window;
-  cv::createHanningWindow(window, high.size(), CV_64F);
-  return high.mul(window);
-}
-
-// Where the parabola through three values, 1 apart, is highest, from the middle one.
-double TopOfParabola(double before, double middle, double after) {
-  const double curvature = before - 2.0 * middle + after;
-  return curvature < 0.0 ? std::clamp(0.5 * (before - after) / curvature, -0.5, 0.5) : 0.0;
-}
-
 }  // namespace
 
-Shift ShiftBetween(const Image<float>& first, const Image<float>& second) {
-  constexpr int kFewestCells = 16;
-  if (first.Size() != second.Size() || std::min(first.width, first.height) < kFewestCells) {
-    return {};
+PixelPlace OriginOfMiddle(ImageSize size_px, ImageSize cells) {
+  // Even, so that the colours of a mosaic keep their places.
+  return {(size_px.width / 2 - cells.width) / 2 * 2, (size_px.height / 2 - cells.height) / 2 * 2};
+}
+
+void AddToMiddle(const Image<float>& plane, float saturation, double exposure,
+                 Image<float>& middle) {
+  constexpr std::array kWeights = {0.125F, 0.375F, 0.375F, 0.125F};
+  if (middle.pixels.empty()) {
+    middle = Image<float>(std::min(plane.width / 2, kMiddleCells),
+                          std::min(plane.height / 2, kMiddleCells));
   }
-  const cv::Mat f = HighPassed(first);
-  const cv::Mat g = HighPassed(second);
-  const double scale = cv::norm(f) * cv::norm(g);
-  if (scale == 0.0) {
-    return {};
-  }
-  cv::Mat spectrum_f;
-  cv::Mat spectrum_g;
-  cv::dft(f, spectrum_f);
-  cv::dft(g, spectrum_g);
-  cv::Mat product;
-  cv::mulSpectrums(spectrum_g, spectrum_f, product, 0, /*conjB=*/true);
-  cv::Mat correlation;  // of shift (x, y), both modulo the size
-  cv::idft(product, correlation, cv::DFT_SCALE | cv::DFT_REAL_OUTPUT);
-  double peak = 0.0;
-  cv::Point at;
-  cv::minMaxLoc(correlation, nullptr, &peak, nullptr, &at);
-  const auto value = [&](int dx, int dy) {
-    return correlation.at<double>((at.y + dy + first.height) % first.height,
-                                  (at.x + dx + first.width) % first.width);
+  const auto [left, top] = OriginOfMiddle(plane.Size(), middle.Size());
+  const auto per_exposure = static_cast<float>(1.0 / exposure);
+  // Mirrored about the outermost site, which keeps the colours of a mosaic in their places.
+  const auto inside = [](int i, int count) {
+    return i < 0 ? -i : i >= count ? 2 * (count - 1) - i : i;
   };
-  const Eigen::Vector2d cells((at.x > first.width / 2 ? at.x - first.width : at.x) +
-                                  TopOfParabola(value(-1, 0), peak, value(1, 0)),
-                              (at.y > first.height / 2 ? at.y - first.height : at.y) +
-                                  TopOfParabola(value(0, -1), peak, value(0, 1)));
-  return {.px = 2.0 * cells, .peak = peak / scale};  // a cell is two pixels
+  for (int y = 0; y < middle.height; ++y) {
+    for (int x = 0; x < middle.width; ++x) {
+      float sum = 0.0F;
+      for (int v = 0; v < 4; ++v) {
+        for (int u = 0; u < 4; ++u) {
+          const float value = plane.At(inside(left + 2 * x + u - 1, plane.width),
+                                       inside(top + 2 * y + v - 1, plane.height));
+          sum += kWeights[static_cast<size_t>(u)] * kWeights[static_cast<size_t>(v)] *
+                 (value < saturation ? value : std::numeric_limits<float>::quiet_NaN());
+        }
+      }
+      middle.At(x, y) += per_exposure * sum;
+    }
+  }
 }
 
 Result<FrameLook> CheckFrame(const FrameFile& file, const Rig& rig,
@@ -149,7 +114,7 @@ Result<FrameLook> CheckFrame(const FrameFile& file, const Rig& rig,
   }
   FrameLook look{.means = *std::move(means)};
   if (role != FrameRole::kDark) {
-    Result<Image<float>> middle = ReadMiddle(file.path);
+    Result<Image<float>> middle = ReadMiddle(file);
     if (!middle) {
       return tl::unexpected(middle.error());
     }

@@ -46,7 +46,7 @@ Result<NumberRow> ReadLine(const TextLine& line, const fs::path& lp_file, Captur
   if (!image) {
     return tl::unexpected(image.error());
   }
-  plan.lit.emplace_back(FrameFile{*std::move(image), 1.0, std::nullopt});
+  plan.lit.emplace_back(1, FrameFile{*std::move(image), 1.0, std::nullopt});
   return row;
 }
 

@@ -99,7 +99,7 @@ Result<CapturePlan> PlanDiligent(const fs::path& dir) {
     if (const Status status = light.Validate(rgb.place); !status) {
       return tl::unexpected(status.error());
     }
-    plan.lit.emplace_back(FrameFile{dir / tables->names[k].text, 1.0, std::nullopt});
+    plan.lit.emplace_back(1, FrameFile{dir / tables->names[k].text, 1.0, std::nullopt});
   }
   return plan;
 }
@@ -129,7 +129,7 @@ Result<CapturePlan> PlanLightsFolder(const fs::path& dir, const fs::path& lights
   }
   plan.rig.lights = *std::move(lights);
   for (const std::string& image : images) {
-    plan.lit.emplace_back(FrameFile{dir / image, 1.0, std::nullopt});
+    plan.lit.emplace_back(1, FrameFile{dir / image, 1.0, std::nullopt});
   }
   return plan;
 }
@@ -143,7 +143,7 @@ Result<CapturePlan> PlanPhotographs(const fs::path& dir) {
   }
   std::erase_if(*names, IsReferenceName);
   for (const std::string& image : SelectImages(*names, plan)) {
-    plan.lit.emplace_back(FrameFile{dir / image, 1.0, std::nullopt});
+    plan.lit.emplace_back(1, FrameFile{dir / image, 1.0, std::nullopt});
     Light light;
     light.name = fs::path(image).stem().string();
     plan.rig.lights.push_back(light);

@@ -28,6 +28,9 @@ struct SessionFrame {
   std::optional<double> exposure_s;
   std::optional<double> f_number;
   std::optional<double> iso;
+  // How its picture lies against the first lit frame's, where camera or fabric have moved a little:
+  // what is at x there is at x + shift_px. [px right, px down]
+  std::optional<Eigen::Vector2d> shift_px;
 
   /// The value of a file divided by H is radiance:
   ///
@@ -48,7 +51,8 @@ struct SessionFrame {
 ///         "sha256": "60303...",             optional
 ///         "exposure_s": 0.0125,             optional, > 0; for every frame or for none
 ///         "f_number": 8,                    optional, likewise
-///         "iso": 100}],                     optional, likewise
+///         "iso": 100,                       optional, likewise
+///         "shift_px": [0.31, -0.12]}],      optional: right, down; at most 100 each
 ///      "table_from_sheet": [16 numbers],    optional: rigid, row-major, millimetres
 ///      "mask": "mask.png"}                  optional: relative to the session's folder
 struct Session {

@@ -10,6 +10,8 @@ constexpr std::array kKinds = {SessionKind::kFabric, SessionKind::kSheet, Sessio
                                SessionKind::kBoard};
 constexpr std::array kRoles = {FrameRole::kLit, FrameRole::kDark, FrameRole::kRepeat};
 
+constexpr double kMostShiftPx = 100.0;  // what a capture may accept (FrameCheckOptions)
+
 // The value whose name stands at `key`; the first one after a failure.
 template <typename Enum, size_t N>
 Enum ReadName(JsonReader& json, std::string_view key, const std::array<Enum, N>& values) {
@@ -96,6 +98,12 @@ SessionFrame ReadSessionFrame(JsonReader& json) {
   frame.exposure_s = ReadFactor(json, "exposure_s", 3600.0);
   frame.f_number = ReadFactor(json, "f_number", 1000.0);
   frame.iso = ReadFactor(json, "iso", 1e7);
+  if (const auto shift = json.OptionalNumbers("shift_px", 2)) {
+    frame.shift_px = Eigen::Vector2d((*shift)[0], (*shift)[1]);
+    json.Require(frame.shift_px->cwiseAbs().maxCoeff() <= kMostShiftPx, "shift_px",
+                 fmt::format("is [{}, {}]; need at most {:g} px each", frame.shift_px->x(),
+                             frame.shift_px->y(), kMostShiftPx));
+  }
   return frame;
 }
 
@@ -114,6 +122,9 @@ nlohmann::ordered_json SessionFrameToJson(const SessionFrame& frame) {
   PutIfKnown(json, "exposure_s", frame.exposure_s);
   PutIfKnown(json, "f_number", frame.f_number);
   PutIfKnown(json, "iso", frame.iso);
+  if (frame.shift_px) {
+    json["shift_px"] = {frame.shift_px->x(), frame.shift_px->y()};
+  }
   return json;
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "core/sha256.h"
 
@@ -42,12 +43,63 @@ std::string NamesOf(const Lights& lights) {
   return names;
 }
 
+// Of one light several exposures of one picture may be merged, and nothing else.
+Status AddToLight(const FrameFile& file, const SessionFrame& frame, const Session& session,
+                  const std::string& where, const fs::path& dir, LightFiles& files) {
+  for (const FrameFile& other : files) {
+    const std::string both =
+        fmt::format("{}: frames {} and {} are both of light '{}'", where,
+                    other.path.lexically_relative(dir).string(), frame.file, frame.light);
+    if (session.kind == SessionKind::kChart) {
+      return Fail(
+          ErrorCode::kBadData,
+          "{}; need one frame for each light; the series of a chart is for sateen calibrate "
+          "response",
+          both);
+    }
+    if (other.exposure == file.exposure) {
+      return Fail(ErrorCode::kBadData,
+                  "{}, with one exposure; need one frame for each light, or several that differ in "
+                  "exposure_s",
+                  both);
+    }
+    if (other.shift_px != file.shift_px) {
+      return Fail(ErrorCode::kBadData,
+                  "{}, with another shift_px; need one for all that are merged: capture them again",
+                  both);
+    }
+  }
+  const auto shorter = std::ranges::find_if(
+      files, [&](const FrameFile& other) { return other.exposure < file.exposure; });
+  files.insert(shorter, file);
+  return {};
+}
+
+// With another aperture or ISO the picture, or the sensor's noise, is another one.
+Status CheckSettings(const Session& session, const std::string& where) {
+  std::map<std::string, const SessionFrame*> first;
+  for (const SessionFrame& frame : session.frames) {
+    if (frame.role != FrameRole::kLit || session.kind == SessionKind::kChart) {
+      continue;
+    }
+    const SessionFrame& other = *first.emplace(frame.light, &frame).first->second;
+    if (other.f_number != frame.f_number || other.iso != frame.iso) {
+      return Fail(ErrorCode::kBadData,
+                  "{}: frames {} and {} of light '{}' differ in aperture or ISO; to be merged they "
+                  "may differ in exposure_s alone",
+                  where, other.file, frame.file, frame.light);
+    }
+  }
+  return {};
+}
+
 // Puts each frame at the place of its light.
 Status AssignFrames(const fs::path& dir, CapturePlan& plan) {
   const std::string where = (dir / "session.json").string();
   plan.lit.resize(plan.rig.lights.size());
   for (const SessionFrame& frame : plan.session->frames) {
-    FrameFile file{dir / frame.file, frame.Exposure(), frame.sha256, plan.rig.response};
+    FrameFile file{dir / frame.file, frame.Exposure(), frame.sha256, plan.rig.response,
+                   frame.shift_px.value_or(Eigen::Vector2d::Zero())};
     if (frame.role == FrameRole::kDark) {
       plan.dark.push_back(std::move(file));
       continue;
@@ -61,18 +113,12 @@ Status AssignFrames(const fs::path& dir, CapturePlan& plan) {
                   frame.file, frame.light,
                   lights.empty() ? "none: give it rough positions by the ruler" : NamesOf(lights));
     }
-    std::optional<FrameFile>& slot = plan.lit[static_cast<size_t>(light - lights.begin())];
-    if (slot) {
-      return Fail(ErrorCode::kBadData,
-                  "{}: frames {} and {} are both of light '{}'; need one frame for each light{}",
-                  where, slot->path.lexically_relative(dir).string(), frame.file, frame.light,
-                  plan.session->kind == SessionKind::kChart
-                      ? "; the series of a chart is for sateen calibrate response"
-                      : "");
+    LightFiles& files = plan.lit[static_cast<size_t>(light - lights.begin())];
+    if (Status status = AddToLight(file, frame, *plan.session, where, dir, files); !status) {
+      return status;
     }
-    slot = std::move(file);
   }
-  return {};
+  return CheckSettings(*plan.session, where);
 }
 
 // A calibrated rig differs from the one that the session was captured with by what a ruler is wrong

@@ -16,6 +16,10 @@ namespace {
 Result<std::vector<Eigen::Vector3d>> MeanOfDark(const std::vector<FrameFile>& dark,
                                                 const BlockGrid& grid, Sheet& sheet) {
   std::vector<Eigen::Vector3d> mean;
+  double sum = 0.0;
+  for (const FrameFile& file : dark) {
+    sum += file.exposure * file.exposure;
+  }
   for (const FrameFile& file : dark) {
     const Result<BlockMeans> one = ReadBlockMeans(file, grid);
     if (!one) {
@@ -24,7 +28,7 @@ Result<std::vector<Eigen::Vector3d>> MeanOfDark(const std::vector<FrameFile>& da
     sheet.sha256_of_input[file.path.string()] = one->sha256;
     mean.resize(one->blocks.size(), Eigen::Vector3d::Zero());
     for (size_t i = 0; i < mean.size(); ++i) {
-      mean[i] += one->blocks[i].radiance_rgb / static_cast<double>(dark.size());
+      mean[i] += (file.exposure * file.exposure / sum) * one->blocks[i].radiance_rgb;
     }
   }
   return mean;
@@ -80,16 +84,16 @@ void AddSamples(const std::vector<BlockSample>& blocks, const Places& places, si
   }
 }
 
-// By the border of the sheet, in the frames that are `usable`.
+// By the border of the sheet, in the frame of each light that is `usable`.
 Status FindPose(const std::filesystem::path& dir, const CapturePlan& plan,
-                const std::vector<bool>& usable, const SheetBorder& border, const Task& task,
-                Sheet& sheet) {
+                const std::vector<std::optional<size_t>>& usable, const SheetBorder& border,
+                const Task& task, Sheet& sheet) {
   std::vector<FrameFile> lit;
   std::vector<std::string> names;
   for (size_t k = 0; k < plan.lit.size(); ++k) {
     if (usable[k]) {
-      lit.push_back(*plan.lit[k]);
-      names.push_back(plan.lit[k]->path.lexically_relative(dir).string());
+      lit.push_back(plan.lit[k][*usable[k]]);
+      names.push_back(lit.back().path.lexically_relative(dir).string());
     }
   }
   task.BeginStage("pose of " + dir.filename().string(), static_cast<int>(lit.size()));
@@ -120,11 +124,11 @@ Status CheckPlan(const std::filesystem::path& dir, const CapturePlan& plan, bool
   if (Status pose = plan.rig.RequirePose(dir.string()); !pose) {
     return pose;
   }
-  if (std::ranges::none_of(plan.lit, [](const auto& file) { return file.has_value(); })) {
+  if (std::ranges::none_of(plan.lit, [](const auto& files) { return !files.empty(); })) {
     return Fail(ErrorCode::kBadData, "{}: has no lit frame", dir.string());
   }
   for (size_t k = 0; k < plan.lit.size(); ++k) {
-    if (!plan.lit[k] && !allow_missing) {
+    if (plan.lit[k].empty() && !allow_missing) {
       return Fail(ErrorCode::kBadData, "{}: has no frame of light '{}'", dir.string(),
                   plan.rig.lights[k].name);
     }
@@ -157,11 +161,15 @@ class SheetReader {
   }
 
  private:
-  // [light]
   Status ReadFrames() {
-    const size_t count = plan_.lit.size();
-    task_.BeginStage("reading " + dir_.filename().string(),
-                     static_cast<int>(count + plan_.dark.size()));
+    size_t count = plan_.dark.size();
+    for (size_t k = 0; k < plan_.lit.size(); ++k) {
+      for (const FrameFile& file : plan_.lit[k]) {
+        files_.emplace_back(k, &file);
+        ++count;
+      }
+    }
+    task_.BeginStage("reading " + dir_.filename().string(), static_cast<int>(count));
     Result<std::vector<Eigen::Vector3d>> dark = MeanOfDark(plan_.dark, options_.grid, sheet_);
     if (!dark) {
       return tl::unexpected(dark.error());
@@ -171,50 +179,64 @@ class SheetReader {
       sheet_.dark_rgb = MeanOf(dark_);
     }
     task_.Advance(static_cast<int>(plan_.dark.size()));
-    means_.resize(count);
-    return ParallelFor(static_cast<int>(count), 1, task_, [&](int begin, int end) {
-      for (int k = begin; k < end; ++k) {
-        if (const std::optional<FrameFile>& file = plan_.lit[static_cast<size_t>(k)]) {
-          means_[static_cast<size_t>(k)] = ReadBlockMeans(*file, options_.grid);
-        }
+    means_.resize(files_.size());
+    return ParallelFor(static_cast<int>(files_.size()), 1, task_, [&](int begin, int end) {
+      for (int i = begin; i < end; ++i) {
+        const auto f = static_cast<size_t>(i);
+        means_[f] = ReadBlockMeans(*files_[f].second, options_.grid);
       }
     });
   }
 
   // [light][block]; none of a light without a frame.
   Status TakeBlocks() {
-    blocks_.resize(means_.size());
-    for (size_t k = 0; k < means_.size(); ++k) {
-      if (!plan_.lit[k]) {
-        continue;
+    const Places everywhere(
+        static_cast<size_t>(options_.grid.columns) * static_cast<size_t>(options_.grid.rows),
+        Eigen::Vector3d::Zero());
+    blocks_.resize(plan_.lit.size());
+    usable_.resize(plan_.lit.size());
+    std::vector<size_t> seen(plan_.lit.size(), 0);  // frames of each light
+    for (size_t f = 0; f < files_.size(); ++f) {
+      if (!means_[f]) {
+        return tl::unexpected(means_[f].error());
       }
-      if (!means_[k]) {
-        return tl::unexpected(means_[k].error());
-      }
-      const ImageSize& size = means_[k]->size_px;
+      const auto& [k, file] = files_[f];
+      const ImageSize& size = means_[f]->size_px;
       const ImageSize& expected = sheet_.rig.camera->size_px;
-      const std::filesystem::path& path = plan_.lit[k]->path;
       if (size != expected) {
         return Fail(ErrorCode::kBadData, "{}: is {} x {} px, but the rig's camera has {} x {}",
-                    path.string(), size.width, size.height, expected.width, expected.height);
+                    file->path.string(), size.width, size.height, expected.width, expected.height);
       }
-      sheet_.sha256_of_input[path.string()] = means_[k]->sha256;
-      blocks_[k] = BlockSamplesOf(*means_[k], dark_);
-      any_ = k;
+      sheet_.sha256_of_input[file->path.string()] = means_[f]->sha256;
+      std::vector<BlockSample> blocks = BlockSamplesOf(*means_[f], dark_);
+      if (!usable_[k] && SpoiltOf(blocks, everywhere).Fault() == FrameFault::kNone) {
+        usable_[k] = seen[k];
+      }
+      ++seen[k];
+      TakeUnsaturated(std::move(blocks), blocks_[k]);
+      any_ = f;
     }
     return {};
+  }
+
+  // Adds a shorter exposure to what the longer ones say.
+  static void TakeUnsaturated(std::vector<BlockSample> shorter, std::vector<BlockSample>& blocks) {
+    if (blocks.empty()) {
+      blocks = std::move(shorter);
+      return;
+    }
+    for (size_t b = 0; b < blocks.size(); ++b) {
+      if (blocks[b].saturated) {
+        blocks[b] = shorter[b];
+      }
+    }
   }
 
   Status FindPoseByBorder() {
     if (!options_.border || (sheet_.pose_is_recorded && !options_.find_poses)) {
       return {};
     }
-    const Places everywhere(blocks_[any_].size(), Eigen::Vector3d::Zero());
-    std::vector<bool> usable(blocks_.size());
-    for (size_t k = 0; k < blocks_.size(); ++k) {
-      usable[k] = plan_.lit[k] && SpoiltOf(blocks_[k], everywhere).Fault() == FrameFault::kNone;
-    }
-    return FindPose(dir_, plan_, usable, *options_.border, task_, sheet_);
+    return FindPose(dir_, plan_, usable_, *options_.border, task_, sheet_);
   }
 
   Status TakeSamples() {
@@ -233,11 +255,11 @@ class SheetReader {
     sheet_.blocks.resize(count);
     sheet_.faults.resize(count, FrameFault::kDark);
     for (size_t k = 0; k < count; ++k) {
-      if (!plan_.lit[k]) {
+      if (plan_.lit[k].empty()) {
         continue;
       }
       sheet_.faults[k] = FrameFault::kNone;
-      if (Status status = CheckFrame(*plan_.lit[k], SpoiltOf(blocks_[k], places), k,
+      if (Status status = CheckFrame(plan_.lit[k].back(), SpoiltOf(blocks_[k], places), k,
                                      options_.allow_bad_frames, sheet_);
           !status) {
         return status;
@@ -254,9 +276,12 @@ class SheetReader {
   const CapturePlan plan_;
   const Task task_;
   std::vector<Eigen::Vector3d> dark_;
-  std::vector<Result<BlockMeans>> means_;
+  std::vector<std::pair<size_t, const FrameFile*>> files_;  // with the light, longest first
+  std::vector<Result<BlockMeans>> means_;                   // of each file
   std::vector<std::vector<BlockSample>> blocks_;
-  size_t any_ = 0;  // a light with a frame
+  std::vector<std::optional<size_t>>
+      usable_;      // [light]: its longest exposure to find the border in
+  size_t any_ = 0;  // a file
   Sheet sheet_;
 };
 

@@ -48,6 +48,11 @@ struct Sheet {
 /// Reads a sheet session frame by frame: memory for one frame a thread. The sheet lies where
 /// `table_from_sheet` of the session says, or where its border is seen, or on the table.
 ///
+/// Where a light has several exposures, each block is taken from the longest that is not saturated
+/// there: paper is bright, so the others would add little. shift_px of a frame is left aside: a block
+/// is tens of pixels wide and paper has no texture, so that a pixel moves its mean by less than 1e-3
+/// of what neighbouring blocks differ by.
+///
 /// Errors   kIo, kBadData: as ReadCapture(); the session is of another kind; the rig has no camera; a
 ///          light without a frame; a frame that is saturated or dark over more than half of the sheet
 ///          kDegenerate: as FitSheetPose(), with the session's folder; kCancelled

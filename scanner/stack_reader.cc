@@ -88,9 +88,9 @@ Status ReplaceRig(const fs::path& rig_file, CapturePlan& plan) {
   }
   plan.sha256_of_input[rig_file.string()] = *hash;
   plan.rig = *std::move(rig);
-  for (std::optional<FrameFile>& frame : plan.lit) {
-    if (frame) {
-      frame->response = plan.rig.response;
+  for (LightFiles& files : plan.lit) {
+    for (FrameFile& frame : files) {
+      frame.response = plan.rig.response;
     }
   }
   for (FrameFile& frame : plan.dark) {
@@ -112,6 +112,14 @@ Result<CapturePlan> Plan(const fs::path& path, const ReadCaptureOptions& options
   if (options.mask_file) {
     plan->mask = options.mask_file;
   }
+  if (options.truth_dir) {
+    plan->truth = FindSessionTruth(*options.truth_dir);
+    if (!plan->truth) {
+      return Fail(ErrorCode::kIo,
+                  "{}: has no truth/normal.exr; give the folder of a simulated session",
+                  options.truth_dir->string());
+    }
+  }
   return plan;
 }
 
@@ -122,7 +130,7 @@ Status SelectLights(const std::vector<int>& wanted, CapturePlan& plan) {
   }
   const int count = static_cast<int>(plan.lit.size());
   Lights lights;
-  std::vector<std::optional<FrameFile>> lit;
+  std::vector<LightFiles> lit;
   std::set<int> seen;
   for (const int k : wanted) {
     if (k < 0 || k >= count) {
@@ -142,25 +150,25 @@ Status SelectLights(const std::vector<int>& wanted, CapturePlan& plan) {
 }
 
 // Every light has a frame, and no file serves two of them.
-Result<std::vector<FrameFile>> LitFrames(const fs::path& path, const CapturePlan& plan) {
-  std::vector<FrameFile> frames;
+Status CheckLitFrames(const fs::path& path, const CapturePlan& plan) {
   std::set<fs::path> seen;
   for (size_t k = 0; k < plan.lit.size(); ++k) {
-    if (!plan.lit[k]) {
+    if (plan.lit[k].empty()) {
       return Fail(ErrorCode::kBadData,
                   "{}: no lit frame of light '{}'; capture it again, or leave this light out with "
                   "--lights",
                   path.string(), plan.rig.lights[k].name);
     }
-    const FrameFile& frame = *plan.lit[k];
-    if (!seen.insert(frame.path.lexically_normal()).second) {
-      return Fail(ErrorCode::kBadData,
-                  "{}: is named for two lights, the second is '{}'; need a file for each light",
-                  frame.path.string(), plan.rig.lights[k].name);
+    for (const FrameFile& frame : plan.lit[k]) {
+      if (!seen.insert(frame.path.lexically_normal()).second) {
+        return Fail(ErrorCode::kBadData,
+                    "{}: is named twice, the second time for light '{}'; need a file for each "
+                    "frame",
+                    frame.path.string(), plan.rig.lights[k].name);
+      }
     }
-    frames.push_back(frame);
   }
-  return frames;
+  return {};
 }
 
 Status ReadMaskInto(const CapturePlan& plan, Capture& capture) {
@@ -238,11 +246,10 @@ Result<Capture> ReadCapture(const fs::path& path, const ReadCaptureOptions& opti
   if (const Status status = SelectLights(options.lights, *plan); !status) {
     return tl::unexpected(status.error());
   }
-  const Result<std::vector<FrameFile>> lit = LitFrames(path, *plan);
-  if (!lit) {
-    return tl::unexpected(lit.error());
+  if (const Status status = CheckLitFrames(path, *plan); !status) {
+    return tl::unexpected(status.error());
   }
-  Result<LoadedFrames> frames = LoadFrames(*lit, plan->dark, options.encoding, task);
+  Result<LoadedFrames> frames = LoadFrames(plan->lit, plan->dark, options.encoding, task);
   if (!frames) {
     return tl::unexpected(frames.error());
   }

@@ -35,6 +35,8 @@ struct ReadCaptureOptions {
   // in the same order; those of a session are matched by name.
   std::optional<std::filesystem::path> rig_file = std::nullopt;
   std::optional<std::filesystem::path> mask_file = std::nullopt;
+  // A simulated session whose truth is this capture's too, in place of what lies beside it.
+  std::optional<std::filesystem::path> truth_dir = std::nullopt;
   // Of a folder that is no session take all photographs, one for each light, whose directions are
   // not known yet (docs/calibration.md, Chrome spheres).
   bool lights_unknown = false;

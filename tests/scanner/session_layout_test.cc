@@ -1,6 +1,7 @@
 #include "scanner/session_layout.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "core/sha256.h"
 #include "tests/scanner/captures.h"
@@ -126,13 +127,111 @@ TEST_F(SessionLayout, NamesTheLightWithoutAFrameUnlessItIsNotUsed) {
   EXPECT_THAT(MustRead({.lights = {3, 0}}).stack, SizeIs(2));
 }
 
-TEST_F(SessionLayout, RefusesTwoFramesOfALight) {
+TEST_F(SessionLayout, RefusesTwoFramesOfALightAndOneExposure) {
   Session session = FourLightSession();
   session.frames[2].light = "east";
   Write(session);
   EXPECT_THAT(FailureOf(dir_), IsError(ErrorCode::kBadData,
                                        "frames frames/east.exr and frames/north.exr are both of "
-                                       "light 'east'"));
+                                       "light 'east', with one exposure"));
+}
+
+// Four lights; of the first one more exposure, eight times as long.
+class Bracketed : public SessionLayout {
+ protected:
+  Bracketed() {
+    for (SessionFrame& frame : session_.frames) {
+      frame.exposure_s = 0.5;
+    }
+    session_.frames[0].file = "frames/east.png";
+    session_.frames.push_back(session_.frames[0]);
+    session_.frames.back().file = "frames/east-long.png";
+    session_.frames.back().exposure_s = 4.0;
+  }
+  // 16-bit readings at (1, 1) and elsewhere.
+  void WriteEast(const std::string& name, uint16_t here, uint16_t elsewhere) {
+    Image<uint16_t> plane(testing::kSize, elsewhere);
+    plane.At(1, 1) = here;
+    ASSERT_TRUE(WritePng16(dir_ / "frames" / name, {plane, plane, plane}));
+  }
+  Session session_ = FourLightSession();
+};
+
+TEST_F(Bracketed, AreMergedAsRadianceAndTheShortestSaysWhatSaturates) {
+  Write(session_);
+  WriteEast("east.png", 65535, 13107);       // 0.2 / 0.5 = 0.4
+  WriteEast("east-long.png", 65535, 26214);  // 0.4 / 4 = 0.1
+  const Capture capture = MustRead();
+  ASSERT_THAT(capture.stack, SizeIs(4));
+  EXPECT_FLOAT_EQ(capture.stack[0].full_scale, 2.0F);
+  EXPECT_EQ(ValueOf(capture.stack[0]), 2.0F);
+  const float dark = 0.05F / 0.5F;
+  EXPECT_NEAR(capture.stack[0].rgb[0].At(0, 0), (0.4F * 0.5F + 0.1F * 4.0F) / 4.5F - dark, 1e-5F);
+  EXPECT_EQ(capture.sha256_of_input.count((dir_ / "frames/east-long.png").string()), 1U);
+  WriteEast("east.png", 13107, 13107);
+  EXPECT_NEAR(ValueOf(MustRead().stack[0]), 0.4F - dark, 1e-5F);  // the long one is saturated there
+}
+
+TEST_F(Bracketed, GiveTheSameBitsOnAnyNumberOfThreads) {
+  Write(session_);
+  WriteEast("east.png", 13107, 1311);
+  WriteEast("east-long.png", 65535, 10486);
+  const Capture one = *ReadCapture(dir_, {}, {.threads = 1});
+  const Capture three = *ReadCapture(dir_, {}, {.threads = 3});
+  for (size_t k = 0; k < 4; ++k) {
+    EXPECT_EQ(one.stack[k].rgb[1].pixels, three.stack[k].rgb[1].pixels);
+  }
+}
+
+TEST_F(Bracketed, MustDifferInExposureTimeAlone) {
+  for (SessionFrame& frame : session_.frames) {
+    frame.iso = 100;
+  }
+  session_.frames.back().iso = 400;
+  Write(session_);
+  EXPECT_THAT(FailureOf(dir_), IsError(ErrorCode::kBadData, "differ in aperture or ISO"));
+  session_.frames.back().iso = 100;
+  session_.frames.back().shift_px = Eigen::Vector2d(0.3, 0.0);
+  Write(session_);
+  EXPECT_THAT(FailureOf(dir_), IsError(ErrorCode::kBadData, "with another shift_px"));
+}
+
+TEST_F(SessionLayout, WeighsDarkFramesByTheSquareOfTheirExposure) {
+  Session session = FourLightSession();
+  session.frames.push_back(session.frames.back());
+  session.frames.back().file = "frames/dark2.exr";
+  for (SessionFrame& frame : session.frames) {
+    frame.exposure_s = 1.0;
+  }
+  session.frames.back().exposure_s = 3.0;
+  Write(session);
+  WriteFlat(dir_ / "frames/dark2.exr", 0.06F);
+  EXPECT_NEAR(ValueOf(MustRead().stack[0]), 0.1F - (1.0F * 0.05F + 9.0F * 0.02F) / 10.0F, 1e-6F);
+}
+
+TEST_F(SessionLayout, LaysAFrameThatHasMovedOverTheFirst) {
+  Session session = FourLightSession();
+  session.frames[1].shift_px = Eigen::Vector2d(1.0, 0.0);
+  Write(session);
+  Image3 west(testing::kSize, 0.2F);
+  west[0].At(2, 1) = 0.3F;
+  ASSERT_TRUE(WriteExr(dir_ / "frames/west.exr", west));
+  const Capture capture = MustRead();
+  EXPECT_FLOAT_EQ(capture.stack[1].rgb[0].At(1, 1), 0.3F - 0.05F);
+  EXPECT_FLOAT_EQ(capture.stack[1].rgb[0].At(2, 1), 0.2F - 0.05F);
+  EXPECT_TRUE(std::isnan(capture.stack[1].rgb[0].At(3, 1)));
+}
+
+TEST_F(SessionLayout, TakesTheTruthOfAnotherSession) {
+  Write(FourLightSession());
+  const fs::path other = temp_.Path() / "scene";
+  fs::create_directories(other / "truth");
+  EXPECT_THAT(FailureOf(dir_, {.truth_dir = other}),
+              IsError(ErrorCode::kIo, "has no truth/normal.exr"));
+  ASSERT_TRUE(WriteExr(other / "truth/normal.exr", testing::LevelNormals()));
+  const Capture capture = MustRead({.truth_dir = other});
+  ASSERT_TRUE(capture.truth);
+  EXPECT_EQ(capture.truth->source, (other / "truth/normal.exr").string());
 }
 
 TEST_F(SessionLayout, RefusesALightThatTheRigHasNot) {

@@ -32,6 +32,7 @@ Session FullSession() {
     frame.f_number = 5.6;
     frame.iso = 200;
   }
+  session.frames[1].shift_px = Eigen::Vector2d(0.31, -0.125);
   return session;
 }
 
@@ -57,6 +58,8 @@ TEST(Session, ComesBackAsItWasWritten) {
   ASSERT_EQ(read->frames.size(), 5U);
   EXPECT_EQ(read->frames[1].light, "west");
   EXPECT_EQ(read->frames[1].file, "frames/west.exr");
+  EXPECT_EQ(read->frames[1].shift_px, Eigen::Vector2d(0.31, -0.125));
+  EXPECT_FALSE(read->frames[0].shift_px);
   EXPECT_EQ(read->frames[4].role, FrameRole::kDark);
   EXPECT_EQ(read->frames[4].f_number, 5.6);
 }
@@ -135,6 +138,8 @@ TEST(Session, RefusesEachKeyOfAFrameThatIsWrong) {
   expect([](Json& f) { f["exposure_s"] = 0; }, "exposure_s is 0; need more than 0");
   expect([](Json& f) { f["f_number"] = -2; }, "f_number is -2; need more than 0");
   expect([](Json& f) { f["iso"] = 1e9; }, "iso is 1000000000");
+  expect([](Json& f) { f["shift_px"] = {1, 101}; }, "shift_px is [1, 101]; need at most 100");
+  expect([](Json& f) { f["shift_px"] = {1}; }, "shift_px");
   expect([](Json& f) { f["gain"] = 1; }, "gain is not known");
 }
 

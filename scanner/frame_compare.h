@@ -1,0 +1,29 @@
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "rig/rig.h"
+#include "scanner/frame_check.h"
+
+// The parts of CheckCapture() that lay frames over each other. `on`: the lights that are on, alone.
+namespace sateen {
+
+// CaptureCheck::shifts. Of a light that is not on, infinitely uncertain.
+[[nodiscard]] std::vector<Shift> ShiftsOf(const Rig& rig, const CaptureLooks& looks,
+                                          const std::vector<bool>& on,
+                                          const FrameCheckOptions& options);
+
+// kMoved, of every frame: which frames have moved, and how far; nothing where none has too far.
+[[nodiscard]] std::optional<CaptureFault> MovedFault(const Rig& rig,
+                                                     const std::vector<Shift>& shifts,
+                                                     const FrameCheckOptions& options);
+
+// kShaded, of one light each; kOtherLight of two where it is their places that are exchanged, which on
+// cloth that does not lie flat only normals show. `signal`: [light][block], dark subtracted.
+[[nodiscard]] std::vector<CaptureFault> ShadedFaults(const Rig& rig, const CaptureLooks& looks,
+                                                     const std::vector<std::vector<double>>& signal,
+                                                     const std::vector<bool>& on,
+                                                     const FrameCheckOptions& options);
+
+}  // namespace sateen
