@@ -27,6 +27,14 @@ std::string ExposuresText(const std::vector<double>& exposures_s) {
   return text;
 }
 
+double LargestShift(const CaptureCheck& check) {
+  double largest = 0.0;
+  for (const Shift& shift : check.shifts) {
+    largest = std::max(largest, shift.px.norm());
+  }
+  return largest;
+}
+
 double Megabytes(std::uintmax_t bytes) { return static_cast<double>(bytes) / 1e6; }
 
 }  // namespace
@@ -52,8 +60,8 @@ std::string CaptureText(const std::filesystem::path& session, const Rig& rig,
   }
   text += fmt::format("\nfrom start to end: '{}' {:+.2f} %, ambient light {:+.3f} %",
                       rig.lights[0].name, 100.0 * check.drift, 100.0 * check.ambient);
-  if (check.shift) {
-    text += fmt::format(", picture moved by {:.2f} px", check.shift->px.norm());
+  if (!check.shifts.empty()) {
+    text += fmt::format(", picture moved by {:.2f} px at most", LargestShift(check));
   }
   text += '\n';
   for (const std::string& note : check.notes) {
@@ -81,8 +89,8 @@ std::string CaptureJson(const std::filesystem::path& session, const Rig& rig,
   for (std::size_t k = 0; k < check.levels.size(); ++k) {
     json["lights"].push_back({{"name", rig.lights[k].name}, {"level", check.levels[k]}});
   }
-  if (check.shift) {
-    json["shift_px"] = {check.shift->px.x(), check.shift->px.y()};
+  for (const Shift& shift : check.shifts) {
+    json["shifts_px"].push_back({shift.px.x(), shift.px.y()});
   }
   json["notes"] = check.notes;
   json["seconds"] = summary.seconds;

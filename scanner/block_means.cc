@@ -122,32 +122,39 @@ Eigen::Vector2d BlockMeans::Center(int column, int row) const {
   return Extent(column, row).center();
 }
 
+Result<BlockMeans> BlockMeansOf(const FrameFile& file, const RawMosaic& mosaic,
+                                const SensorReading& reading, const BlockGrid& grid) {
+  return Divide(file, mosaic.samples.Size(), grid,
+                [&](Span columns, Span rows) {
+                  return MeanOfMosaic(mosaic, reading, columns, rows, file.exposure);
+                })
+      .map([&](BlockMeans divided) {
+        divided.exposure_s = mosaic.exposure_s;
+        return divided;
+      });
+}
+
+Result<BlockMeans> BlockMeansOf(const FrameFile& file, const Photo& photo, const BlockGrid& grid) {
+  return Divide(file, photo.rgb.Size(), grid, [&](Span columns, Span rows) {
+    return MeanOfPhoto(photo, ReadingOf(file), columns, rows, file.exposure);
+  });
+}
+
 Result<BlockMeans> ReadBlockMeans(const FrameFile& file, const BlockGrid& grid) {
   Result<std::string> hash = CheckedHash(file);
   if (!hash) {
     return tl::unexpected(hash.error());
   }
-  Result<BlockMeans> means = BlockMeans();
-  if (IsRawName(file.path)) {
-    means = ReadRawMosaic(file.path).and_then([&](const RawMosaic& mosaic) {
-      return ReadingOf(file, mosaic).and_then([&](const SensorReading& reading) {
-        return Divide(file, mosaic.samples.Size(), grid,
-                      [&](Span columns, Span rows) {
-                        return MeanOfMosaic(mosaic, reading, columns, rows, file.exposure);
-                      })
-            .map([&](BlockMeans divided) {
-              divided.exposure_s = mosaic.exposure_s;
-              return divided;
+  Result<BlockMeans> means =
+      IsRawName(file.path)
+          ? ReadRawMosaic(file.path).and_then([&](const RawMosaic& mosaic) {
+              return ReadingOf(file, mosaic).and_then([&](const SensorReading& reading) {
+                return BlockMeansOf(file, mosaic, reading, grid);
+              });
+            })
+          : ReadPhoto(file.path, Encoding::kAuto).and_then([&](const Photo& photo) {
+              return BlockMeansOf(file, photo, grid);
             });
-      });
-    });
-  } else {
-    means = ReadPhoto(file.path, Encoding::kAuto).and_then([&](const Photo& photo) {
-      return Divide(file, photo.rgb.Size(), grid, [&](Span columns, Span rows) {
-        return MeanOfPhoto(photo, ReadingOf(file), columns, rows, file.exposure);
-      });
-    });
-  }
   if (means) {
     means->sha256 = *std::move(hash);
   }

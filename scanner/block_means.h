@@ -6,7 +6,10 @@
 #include <vector>
 
 #include "core/error.h"
+#include "imaging/image_io.h"
+#include "imaging/raw.h"
 #include "scanner/capture_plan.h"
+#include "scanner/sensor_reading.h"
 
 namespace sateen {
 
@@ -43,5 +46,11 @@ struct BlockMeans {
 /// Errors   kIo, kBadData as ReadRawMosaic() and ReadPhoto(); the hash differs from the recorded one;
 ///          the frame has fewer than 4 x 4 sites a block
 [[nodiscard]] Result<BlockMeans> ReadBlockMeans(const FrameFile& file, const BlockGrid& grid);
+
+// The same of a frame that has been decoded; without a hash.
+[[nodiscard]] Result<BlockMeans> BlockMeansOf(const FrameFile& file, const RawMosaic& mosaic,
+                                              const SensorReading& reading, const BlockGrid& grid);
+[[nodiscard]] Result<BlockMeans> BlockMeansOf(const FrameFile& file, const Photo& photo,
+                                              const BlockGrid& grid);
 
 }  // namespace sateen

@@ -18,8 +18,7 @@ namespace fs = std::filesystem;
 constexpr const char* kIncoming = "incoming";
 constexpr double kFabricPeak = 0.8;  // of what saturates
 constexpr double kSheetPeak = 0.6;   // its readings must be proportional to 0.2 %
-constexpr double kClippedPeak = 0.98;
-constexpr int kMostTests = 8;  // frames to find an exposure by
+constexpr int kMostTests = 8;        // frames to find an exposure by
 
 std::string SafeName(std::string name) {
   for (char& c : name) {
@@ -188,21 +187,15 @@ Result<CaptureSession::Arrived> CaptureSession::Shoot(std::size_t frame, int att
   arrived.record.file = FileNameOf(frame, planned, path);
   FrameCheckOptions checks = options_.checks;
   if (!IsBase(frame) || !journal_.begun.exposure_s) {
-    // What a longer exposure loses, the shorter one has; and what was found is found again.
-    checks.max_saturated = 1.0;
+    checks.max_saturated = 1.0;  // the shorter exposure has it, or another one is found
   }
-  arrived.looked = std::async(
+  arrived.look = std::async(
       std::launch::async,
       [this, checks, settings = *set, role = planned.role, place = dir_ / arrived.record.file,
        of = FrameFile{path, arrived.record.Exposure(), std::nullopt, rig_.response}] {
-        Result<Looked> looked =
-            CheckFrame(of, rig_, settings, role, checks).and_then([&](FrameLook look) {
-              return ReadSignalLevels(of).map([&](SignalLevels levels) {
-                return Looked{std::move(look), levels};
-              });
-            });
-        const Status flushed = looked ? FlushToDisk(of.path, place) : Status{};
-        return flushed ? std::move(looked) : Result<Looked>(tl::unexpected(flushed.error()));
+        Result<FrameLook> look = CheckFrame(of, rig_, settings, role, checks);
+        const Status flushed = look ? FlushToDisk(of.path, place) : Status{};
+        return flushed ? std::move(look) : Result<FrameLook>(tl::unexpected(flushed.error()));
       });
   return arrived;
 }
@@ -220,24 +213,24 @@ Status CaptureSession::Place(const Arrived& arrived, SessionFrame& record) {
 }
 
 Status CaptureSession::Settle(Arrived arrived, Tools& tools) {
-  Result<Looked> looked = arrived.looked.get();
-  if (!looked) {
-    return tl::unexpected(looked.error());
+  Result<FrameLook> look = arrived.look.get();
+  if (!look) {
+    return tl::unexpected(look.error());
   }
   const std::size_t frame = arrived.frame;
-  peak_ = looked->levels.peak;
+  peak_ = look->levels.peak;
   if (!journal_.begun.exposure_s && IsBase(frame) && LightOf(frame) != nullptr &&
-      peak_ >= kClippedPeak) {
+      look->levels.saturated > options_.checks.max_saturated) {
     brighter_ = static_cast<std::size_t>(LightOf(frame) - rig_.lights.data());
     return writer_.FrameRejected(
         frame, fmt::format("light '{}' is brighter than the exposure allows", NameOf(frame)));
   }
-  arrived.record.sha256 = looked->look.means.sha256;
+  arrived.record.sha256 = look->means.sha256;
   Status placed = Place(arrived, arrived.record).and_then([&] {
     return writer_.FrameDone(frame, arrived.record);
   });
   if (placed) {
-    looks_[frame] = std::move(looked->look);
+    looks_[frame] = *std::move(look);
     journal_.done[frame] = std::move(arrived.record);
     ++taken_;
     Tell(tools, "capturing", "", 0.0);

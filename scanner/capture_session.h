@@ -16,7 +16,6 @@
 #include "scanner/frame_check.h"
 #include "scanner/journal.h"
 #include "scanner/light_board.h"
-#include "scanner/signal_levels.h"
 #include "scanner/tethered_camera.h"
 
 namespace sateen {
@@ -102,16 +101,12 @@ class CaptureSession {
     const Task& task;
     const CaptureObserver& observer;
   };
-  struct Looked {
-    FrameLook look;
-    SignalLevels levels;
-  };
   // A frame that has arrived, while it is being looked at and flushed by another thread.
   struct Arrived {
     std::size_t frame = 0;
     SessionFrame record;
     std::filesystem::path path;
-    std::future<Result<Looked>> looked;
+    std::future<Result<FrameLook>> look;
   };
 
   CaptureSession(std::filesystem::path dir, Rig rig, Journal journal, JournalWriter writer,
@@ -134,6 +129,7 @@ class CaptureSession {
   [[nodiscard]] Result<CaptureCheck> CheckAll();
   [[nodiscard]] Status RejectFaults(const CaptureCheck& check);
   [[nodiscard]] Result<CaptureSummary> Complete(CaptureCheck check);
+  void RecordShifts(const std::vector<Shift>& shifts, Session& session) const;
   void Tell(const Tools& tools, const char* stage, const std::string& light,
             double exposure_s) const;
 

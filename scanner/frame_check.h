@@ -11,14 +11,15 @@
 #include "scanner/block_means.h"
 #include "scanner/capture_plan.h"
 #include "scanner/frame_registration.h"
+#include "scanner/signal_levels.h"
 #include "scanner/tethered_camera.h"
 
 namespace sateen {
 
 // What the checks of a capture ask for. Shares and changes are relative: 0.1 is 10 %.
 struct FrameCheckOptions {
-  // Most blocks of a frame that may hold a saturated site. (0, 1]
-  double max_saturated = 0.05;
+  // Largest share of a frame's sites that may saturate. (0, 1]
+  double max_saturated = 0.001;
   // Least brightness of a light, of what the rig says against the other lights, to be on. (0, 1)
   double min_level = 0.3;
   // Most that a light may differ from that, where the rig's lights have been calibrated, and where
@@ -47,6 +48,7 @@ struct FrameCheckOptions {
 // What the checks keep of a frame.
 struct FrameLook {
   BlockMeans means;
+  SignalLevels levels;
   // Middle of the picture for the shift (AddToMiddle).
   Image<float> middle;
 };

@@ -7,6 +7,7 @@
 #include "imaging/image_io.h"
 #include "imaging/raw.h"
 #include "scanner/frame_check.h"
+#include "scanner/frame_loader.h"
 #include "scanner/sensor_reading.h"
 
 namespace sateen {
@@ -26,22 +27,28 @@ BlockGrid GridOf(const Rig& rig) {
           .rows = std::clamp(size.height / kSitesOfBlock, 1, kCheckGrid.rows)};
 }
 
-Result<Image<float>> ReadMiddle(const FrameFile& file) {
-  Image<float> middle;
+// Everything that the checks want of a frame, from one decoding of it.
+Result<FrameLook> LookAt(const FrameFile& file, const BlockGrid& grid) {
   if (IsRawName(file.path)) {
     return ReadRawMosaic(file.path).and_then([&](const RawMosaic& mosaic) {
-      return ReadingOf(file, mosaic).map([&](const SensorReading& reading) {
-        AddToMiddle(mosaic.samples, reading.saturation, file.exposure, middle);
-        return std::move(middle);
+      return ReadingOf(file, mosaic).and_then([&](const SensorReading& reading) {
+        return BlockMeansOf(file, mosaic, reading, grid).map([&](BlockMeans means) {
+          FrameLook look{.means = std::move(means), .levels = LevelsOf(mosaic, reading)};
+          AddToMiddle(mosaic.samples, reading.saturation, file.exposure, look.middle);
+          return look;
+        });
       });
     });
   }
-  return ReadPhoto(file.path).map([&](const Photo& photo) {
-    for (const Image<float>& plane : photo.rgb.planes) {
-      AddToMiddle(plane, photo.saturation.value_or(std::numeric_limits<float>::infinity()),
-                  file.exposure, middle);
-    }
-    return std::move(middle);
+  return ReadPhoto(file.path).and_then([&](const Photo& photo) {
+    return BlockMeansOf(file, photo, grid).map([&](BlockMeans means) {
+      FrameLook look{.means = std::move(means), .levels = LevelsOf(photo)};
+      for (const Image<float>& plane : photo.rgb.planes) {
+        AddToMiddle(plane, photo.saturation.value_or(std::numeric_limits<float>::infinity()),
+                    file.exposure, look.middle);
+      }
+      return look;
+    });
   });
 }
 
@@ -84,41 +91,38 @@ void AddToMiddle(const Image<float>& plane, float saturation, double exposure,
 Result<FrameLook> CheckFrame(const FrameFile& file, const Rig& rig,
                              const ExposureSettings& settings, FrameRole role,
                              const FrameCheckOptions& options) {
-  Result<BlockMeans> means = ReadBlockMeans(file, GridOf(rig));
-  if (!means) {
-    return tl::unexpected(means.error());
+  const Result<std::string> hash = CheckedHash(file);
+  Result<FrameLook> look =
+      hash ? LookAt(file, GridOf(rig)) : Result<FrameLook>(tl::unexpected(hash.error()));
+  if (!look) {
+    return look;
   }
+  look->means.sha256 = *hash;
+  const BlockMeans& means = look->means;
   const std::string name = file.path.string();
-  if (rig.camera && means->size_px != rig.camera->size_px) {
+  if (rig.camera && means.size_px != rig.camera->size_px) {
     return Fail(ErrorCode::kBadData,
                 "{}: is {} x {} px, but the rig's camera has {} x {} px; is it the camera that was "
                 "calibrated, at full size?",
-                name, means->size_px.width, means->size_px.height, rig.camera->size_px.width,
+                name, means.size_px.width, means.size_px.height, rig.camera->size_px.width,
                 rig.camera->size_px.height);
   }
-  if (means->exposure_s &&
-      std::abs(*means->exposure_s / settings.exposure_s - 1.0) > options.max_exposure_error) {
+  if (means.exposure_s &&
+      std::abs(*means.exposure_s / settings.exposure_s - 1.0) > options.max_exposure_error) {
     return Fail(ErrorCode::kBadData,
                 "{}: was exposed for {:.4g} s, but the camera was set to {:.4g} s; is it in manual "
                 "mode?",
-                name, *means->exposure_s, settings.exposure_s);
+                name, *means.exposure_s, settings.exposure_s);
   }
-  const auto saturated = static_cast<double>(
-      std::ranges::count_if(means->blocks, [](const BlockMean& block) { return block.saturated; }));
-  const double share = saturated / static_cast<double>(means->blocks.size());
-  if (share > options.max_saturated) {
+  if (look->levels.saturated > options.max_saturated) {
     return Fail(ErrorCode::kBadData,
-                "{}: {:.0f} % of the picture is saturated; at most {:.0f} % may be: expose shorter "
+                "{}: {:.2g} % of its sites are saturated; at most {:.2g} % may be: expose shorter "
                 "than {:.4g} s, or dim the lights with --level",
-                name, 100.0 * share, 100.0 * options.max_saturated, settings.exposure_s);
+                name, 100.0 * look->levels.saturated, 100.0 * options.max_saturated,
+                settings.exposure_s);
   }
-  FrameLook look{.means = *std::move(means)};
-  if (role != FrameRole::kDark) {
-    Result<Image<float>> middle = ReadMiddle(file);
-    if (!middle) {
-      return tl::unexpected(middle.error());
-    }
-    look.middle = *std::move(middle);
+  if (role == FrameRole::kDark) {
+    look->middle = {};
   }
   return look;
 }

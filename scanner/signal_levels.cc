@@ -34,7 +34,10 @@ class Histogram {
   }
 
   [[nodiscard]] SignalLevels Levels() const {
-    return {.peak = Percentile(0.999), .low = Percentile(0.1)};
+    return {.peak = Percentile(0.999),
+            .low = Percentile(0.1),
+            .saturated = static_cast<double>(counts_[kBins]) /
+                         static_cast<double>(std::max<int64_t>(1, total_))};
   }
 
  private:

@@ -210,9 +210,9 @@ std::string SummaryJson(const CaptureSummary& summary) {
                        {"drift", check.drift},
                        {"seconds", summary.seconds},
                        {"camera_seconds", summary.camera_seconds}};
-  if (check.shift) {
-    json["shift"] = {
-        {"x_px", check.shift->px.x()}, {"y_px", check.shift->px.y()}, {"peak", check.shift->peak}};
+  for (const Shift& shift : check.shifts) {
+    json["shifts_px"].push_back(shift.px.x());
+    json["shifts_px"].push_back(shift.px.y());
   }
   return OneLine(json);
 }
@@ -241,12 +241,10 @@ Result<CaptureSummary> SummaryFromJson(const std::string& text) {
                              ? std::vector<double>()
                              : json.OptionalNumberList("levels").value_or(std::vector<double>());
   json.Ignore("levels");
-  if (std::optional<JsonReader> shift = json.OptionalObject("shift")) {
-    summary.check.shift = {.px = {shift->Number("x_px"), shift->Number("y_px")},
-                           .peak = shift->Number("peak")};
-    if (const Status status = shift->Finish(); !status) {
-      return tl::unexpected(status.error());
-    }
+  const std::vector<double> shifts =
+      json.OptionalNumberList("shifts_px").value_or(std::vector<double>());
+  for (std::size_t k = 0; k + 1 < shifts.size(); k += 2) {
+    summary.check.shifts.push_back({.px = {shifts[k], shifts[k + 1]}});
   }
   return Answered(json, std::move(summary));
 }

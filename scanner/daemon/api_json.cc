@@ -96,6 +96,7 @@ constexpr std::pair<std::string_view, double FrameCheckOptions::*> kChecks[] = {
     {"max_drift", &FrameCheckOptions::max_drift},
     {"max_shift_px", &FrameCheckOptions::max_shift_px},
     {"min_shift_peak", &FrameCheckOptions::min_shift_peak},
+    {"min_shade", &FrameCheckOptions::min_shade},
     {"max_exposure_error", &FrameCheckOptions::max_exposure_error}};
 
 void ReadCaptureOptions(JsonReader& json, CaptureOptions& options) {

@@ -290,11 +290,11 @@ TEST(ApiJson, EventsAndSummariesSurviveThereAndBack) {
   summary.check.levels = {1.0, 0.5};
   summary.check.notes = {"first light drifted"};
   summary.check.drift = 0.04;
-  summary.check.shift = {.px = {0.25, -0.5}, .peak = 0.9};
+  summary.check.shifts = {{.px = {0.0, 0.0}}, {.px = {0.25, -0.5}}};
   const Result<CaptureSummary> back = SummaryFromJson(SummaryJson(summary));
   ASSERT_TRUE(back) << back.error().message;
   EXPECT_EQ(SummaryJson(*back), SummaryJson(summary));
-  EXPECT_EQ(back->check.shift->px.y(), -0.5);
+  EXPECT_EQ(back->check.shifts.at(1).px.y(), -0.5);
   EXPECT_EQ(SummaryJson(*SummaryFromJson(SummaryJson({}))), SummaryJson({}));
 }
 
