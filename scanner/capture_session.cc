@@ -531,6 +531,7 @@ Result<CaptureSummary> CaptureSession::Complete(CaptureCheck check) {
   summary.kept = static_cast<int>(journal_.done.size()) - taken_;
   if (status) {
     summary.session = SessionOf(journal_);
+    RecordShifts(summary.check, rig_, summary.session);
     status = WriteFileWhole(dir_ / kRecordFile, SessionToJson(summary.session));
   }
   if (!status) {

@@ -386,4 +386,16 @@ CaptureCheck CheckCapture(const Rig& rig, const CaptureLooks& looks,
   return CaptureChecker(rig, looks, options).Check();
 }
 
+void RecordShifts(const CaptureCheck& check, const Rig& rig, Session& session) {
+  for (SessionFrame& frame : session.frames) {
+    const auto light = std::ranges::find(rig.lights, frame.light, &Light::name);
+    const auto k = static_cast<size_t>(light - rig.lights.begin());
+    frame.shift_px.reset();
+    if (frame.role == FrameRole::kLit && k + 1 < check.shifts.size() &&
+        IsSignificant(check.shifts[k])) {
+      frame.shift_px = (check.shifts[k].px * 1000.0).array().round() / 1000.0;
+    }
+  }
+}
+
 }  // namespace sateen

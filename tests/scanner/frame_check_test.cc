@@ -55,6 +55,27 @@ TEST_F(CheckCaptureCase, SaysWhichFrameMovedAndCameBack) {
   EXPECT_THAT(check.faults[0].text, HasSubstr("in frames of the lights 'led-4'"));
 }
 
+TEST(RecordShifts, WritesWhatIsSignificantToFramesOfTheStack) {
+  const Rig rig = CalibratedRig();
+  Session session;
+  for (const size_t k : {0U, 1U, 2U}) {
+    session.frames.push_back({.role = FrameRole::kLit, .light = rig.lights[k].name});
+  }
+  session.frames.push_back({.role = FrameRole::kRepeat, .light = rig.lights[0].name});
+  session.frames.push_back({.role = FrameRole::kDark});
+  CaptureCheck check;
+  check.shifts.assign(rig.lights.size() + 1, {.px = {0.4004, -0.3}, .sd_px = 0.02});
+  check.shifts[0] = {.sd_px = 0.0};
+  check.shifts[2].sd_px = 0.3;
+  RecordShifts(check, rig, session);
+  EXPECT_EQ(session.frames[1].shift_px, Eigen::Vector2d(0.4, -0.3));
+  for (const size_t frame : {0U, 2U, 3U, 4U}) {
+    EXPECT_FALSE(session.frames[frame].shift_px) << frame;
+  }
+  RecordShifts({}, rig, session);
+  EXPECT_FALSE(session.frames[1].shift_px);
+}
+
 TEST_F(CheckCaptureCase, MeasuresDriftAndAmbientLight) {
   looks_.repeat = LookAt(Mixed(fabric_.lit[0], 1.05F, fabric_.dark, 0.0F), 1);
   looks_.dark_last = LookAt(Mixed(fabric_.dark, 1.0F, fabric_.lit[5], 0.004F), 1);
