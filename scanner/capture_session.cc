@@ -304,25 +304,6 @@ Status CaptureSession::RejectFaults(const CaptureCheck& check) {
   return {};
 }
 
-// Every exposure of a light has the shift of its first.
-void CaptureSession::RecordShifts(const std::vector<Shift>& shifts, Session& session) const {
-  if (shifts.empty()) {
-    return;
-  }
-  for (std::size_t frame = 0; frame < session.frames.size(); ++frame) {
-    const Light* light = LightOf(frame);
-    if (light == nullptr) {
-      continue;
-    }
-    const bool is_repeat = session.frames[frame].role == FrameRole::kRepeat;
-    const Shift& shift =
-        is_repeat ? shifts.back() : shifts[static_cast<std::size_t>(light - rig_.lights.data())];
-    if (IsSignificant(shift)) {
-      session.frames[frame].shift_px = shift.px;
-    }
-  }
-}
-
 Result<CaptureSummary> CaptureSession::Complete(CaptureCheck check) {
   Status status;
   if (!journal_.complete) {
@@ -336,7 +317,7 @@ Result<CaptureSummary> CaptureSession::Complete(CaptureCheck check) {
   summary.camera_seconds = camera_time_.count();
   if (status) {
     summary.session = SessionOf(journal_);
-    RecordShifts(summary.check.shifts, summary.session);
+    RecordShifts(summary.check, rig_, summary.session);
     status = WriteFileWhole(dir_ / kRecordFile, SessionToJson(summary.session));
   }
   if (!status) {

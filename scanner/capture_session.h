@@ -129,7 +129,6 @@ class CaptureSession {
   [[nodiscard]] Result<CaptureCheck> CheckAll();
   [[nodiscard]] Status RejectFaults(const CaptureCheck& check);
   [[nodiscard]] Result<CaptureSummary> Complete(CaptureCheck check);
-  void RecordShifts(const std::vector<Shift>& shifts, Session& session) const;
   void Tell(const Tools& tools, const char* stage, const std::string& light,
             double exposure_s) const;
 

@@ -10,8 +10,9 @@
 namespace sateen {
 namespace {
 
-constexpr double kFitsAsWell = 5.0;  // times the usual misfit of a frame at its own light
-constexpr double kDoubled = 1.4;     // a level from which on another light may be on too
+constexpr double kFitsAsWell = 5.0;   // times the usual misfit of a frame at its own light
+constexpr double kMisleading = 0.02;  // of a frame's light: less looks like nothing but a shadow
+constexpr double kDoubled = 1.4;      // a level from which on another light may be on too
 
 using Field = std::vector<double>;  // one value a block
 
@@ -68,7 +69,7 @@ class CaptureChecker {
     if (check_.faults.empty()) {
       CheckShifts();
     }
-    if (check_.faults.empty()) {
+    if (check_.faults.empty() || SuspectOf(check_)) {
       CheckShades();
     }
     CheckLevels();
@@ -144,10 +145,34 @@ class CaptureChecker {
     }
   }
 
+  // The one light whose frame alone is said to be another light's, or to have moved and come back:
+  // the edge of a shadow can look like both.
+  [[nodiscard]] std::optional<size_t> SuspectOf(const CaptureCheck& check) const {
+    if (check.faults.size() != 1) {
+      return std::nullopt;
+    }
+    const CaptureFault& fault = check.faults[0];
+    return fault.kind == CaptureFaultKind::kOtherLight ? std::optional(fault.lights[0])
+           : fault.kind == CaptureFaultKind::kMoved    ? OnlyOneThatMoved(check.shifts, options_)
+                                                       : std::nullopt;
+  }
+
   // A shaded light is no other one, nor dim.
   void CheckShades() {
-    for (CaptureFault& fault : ShadedFaults(rig_, looks_, signal_, on_, options_)) {
-      is_shaded_[fault.lights[0]] = true;
+    const std::optional<size_t> suspect = SuspectOf(check_);
+    std::vector<CaptureFault> shaded =
+        ShadedFaults(rig_, looks_, signal_, on_, options_, suspect ? kMisleading : 0.0);
+    if (suspect) {
+      const bool explained = std::ranges::any_of(shaded, [&](const CaptureFault& fault) {
+        return fault.kind == CaptureFaultKind::kShaded && fault.lights[0] == *suspect;
+      });
+      if (!explained) {
+        return;
+      }
+      check_.faults.clear();
+    }
+    for (CaptureFault& fault : shaded) {
+      is_explained_[fault.lights[0]] = true;
       check_.faults.push_back(std::move(fault));
     }
   }
@@ -168,7 +193,7 @@ class CaptureChecker {
 
   void FindDark() {
     on_.assign(signal_.size(), true);
-    is_shaded_.assign(signal_.size(), false);
+    is_explained_.assign(signal_.size(), false);
     for (size_t k = 0; k < signal_.size(); ++k) {
       const double level = check_.levels[k];
       if (!(level >= options_.min_level)) {  // also NaN
@@ -188,7 +213,7 @@ class CaptureChecker {
         LightsAreCalibrated(rig_) ? options_.max_level_change : options_.max_rough_level_change;
     for (size_t k = 0; k < signal_.size(); ++k) {
       const double level = check_.levels[k];
-      if (on_[k] && !is_shaded_[k] && std::abs(level - 1.0) > change) {
+      if (on_[k] && !is_explained_[k] && std::abs(level - 1.0) > change) {
         AddFault(
             CaptureFaultKind::kLevel, {k},
             fmt::format("light '{}' has {:.0f} % of the light that the rig says, against the "
@@ -328,7 +353,7 @@ class CaptureChecker {
   std::vector<Field> signal_;     // s of (1)
   std::vector<Field> predicted_;  // E of (1)
   std::vector<bool> on_;          // one light, alone
-  std::vector<bool> is_shaded_;
+  std::vector<bool> is_explained_;
   CaptureCheck check_;
 };
 
@@ -359,6 +384,18 @@ Status FrameCheckOptions::Validate() const {
 CaptureCheck CheckCapture(const Rig& rig, const CaptureLooks& looks,
                           const FrameCheckOptions& options) {
   return CaptureChecker(rig, looks, options).Check();
+}
+
+void RecordShifts(const CaptureCheck& check, const Rig& rig, Session& session) {
+  for (SessionFrame& frame : session.frames) {
+    const auto light = std::ranges::find(rig.lights, frame.light, &Light::name);
+    const auto k = static_cast<size_t>(light - rig.lights.begin());
+    frame.shift_px.reset();
+    if (frame.role == FrameRole::kLit && k + 1 < check.shifts.size() &&
+        IsSignificant(check.shifts[k])) {
+      frame.shift_px = (check.shifts[k].px * 1000.0).array().round() / 1000.0;
+    }
+  }
 }
 
 }  // namespace sateen

@@ -123,4 +123,7 @@ struct CaptureLooks {
 [[nodiscard]] CaptureCheck CheckCapture(const Rig& rig, const CaptureLooks& looks,
                                         const FrameCheckOptions& options);
 
+// Writes the shifts that are significant into the session's lit frames as shift_px, to 0.001 px.
+void RecordShifts(const CaptureCheck& check, const Rig& rig, Session& session);
+
 }  // namespace sateen

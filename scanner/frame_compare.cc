@@ -106,24 +106,36 @@ FramesToShade BlocksOf(const Rig& rig, const BlockMeans& means,
   return frames;
 }
 
-// The frame with which this one has to change lights for all of them to be explained far better.
-std::optional<size_t> SwappedWith(size_t frame, const FrameCheckOptions& options,
-                                  FramesToShade& frames) {
-  const double own = MisfitOfLights(frames);
-  double least = std::sqrt(options.other_light_misfit) * own;  // an option of squares
-  std::optional<size_t> best;
-  for (size_t other = 0; other < frames.light.size(); ++other) {
-    if (other == frame) {
-      continue;
-    }
-    std::swap(frames.light[frame], frames.light[other]);
+// The light that a frame has to be given for all of them to be explained far better.
+struct OtherLight {
+  size_t frame = 0;
+  bool is_swapped = false;  // that frame has to be given this one's
+};
+
+std::optional<OtherLight> OtherLightOf(size_t frame, const FrameCheckOptions& options,
+                                       FramesToShade& frames) {
+  // The option is one of squares.
+  double least = std::sqrt(options.other_light_misfit) * MisfitOfLights(frames);
+  std::optional<OtherLight> best;
+  // Nothing may be left of the shadow then: a slope of light can also look a little like its edge.
+  const auto keep_if_better = [&](const OtherLight& other) {
     const double misfit = MisfitOfLights(frames);
-    std::swap(frames.light[frame], frames.light[other]);
-    if (misfit < least) {
+    if (misfit < least && !FindShades(frames, options.min_shade)[frame]) {
       least = misfit;
       best = other;
     }
+  };
+  const std::vector<Eigen::Vector3d> own = frames.light[frame];
+  for (size_t other = 0; other < frames.light.size(); ++other) {
+    if (other != frame) {
+      frames.light[frame] = frames.light[other];
+      keep_if_better({other, false});
+      frames.light[other] = own;
+      keep_if_better({other, true});
+      frames.light[other] = frames.light[frame];
+    }
   }
+  frames.light[frame] = own;
   return best;
 }
 
@@ -181,10 +193,19 @@ std::optional<CaptureFault> MovedFault(const Rig& rig, const std::vector<Shift>&
           options.max_shift_px)};
 }
 
+std::optional<size_t> OnlyOneThatMoved(const std::vector<Shift>& shifts,
+                                       const FrameCheckOptions& options) {
+  const auto is_far = [&](const Shift& shift) { return IsFar(shift, options); };
+  const auto first = std::ranges::find_if(shifts, is_far);
+  return std::ranges::count_if(shifts, is_far) == 1 && !is_far(shifts.back())
+             ? std::optional(static_cast<size_t>(first - shifts.begin()))
+             : std::nullopt;
+}
+
 std::vector<CaptureFault> ShadedFaults(const Rig& rig, const CaptureLooks& looks,
                                        const std::vector<std::vector<double>>& signal,
                                        const std::vector<bool>& on,
-                                       const FrameCheckOptions& options) {
+                                       const FrameCheckOptions& options, double min_light) {
   if (!rig.camera || !rig.camera->has_pose) {
     return {};
   }
@@ -198,13 +219,13 @@ std::vector<CaptureFault> ShadedFaults(const Rig& rig, const CaptureLooks& looks
   const std::vector<std::optional<Shade>> shades = FindShades(frames, options.min_shade);
   std::vector<CaptureFault> faults;
   for (size_t frame = 0; frame < shades.size(); ++frame) {
-    if (!shades[frame]) {
+    if (!shades[frame] || shades[frame]->share * shades[frame]->depth < min_light) {
       continue;
     }
-    if (const std::optional<size_t> other = SwappedWith(frame, options, frames)) {
-      const size_t a = std::min(of[frame], of[*other]);
-      const size_t b = std::max(of[frame], of[*other]);
-      return {OtherLightFault(rig, a, b), OtherLightFault(rig, b, a)};
+    if (const std::optional<OtherLight> other = OtherLightOf(frame, options, frames)) {
+      const auto [a, b] = std::minmax({of[frame], of[other->frame]});
+      return other->is_swapped ? std::vector{OtherLightFault(rig, a, b), OtherLightFault(rig, b, a)}
+                               : std::vector{OtherLightFault(rig, of[frame], of[other->frame])};
     }
     faults.push_back(ShadeFault(rig, of[frame], *shades[frame]));
   }

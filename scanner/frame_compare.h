@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <optional>
 #include <vector>
 
@@ -19,11 +20,17 @@ namespace sateen {
                                                      const std::vector<Shift>& shifts,
                                                      const FrameCheckOptions& options);
 
-// kShaded, of one light each; kOtherLight of two where it is their places that are exchanged, which on
-// cloth that does not lie flat only normals show. `signal`: [light][block], dark subtracted.
+// The light whose frame alone has moved too far, while those after it have not.
+[[nodiscard]] std::optional<std::size_t> OnlyOneThatMoved(const std::vector<Shift>& shifts,
+                                                          const FrameCheckOptions& options);
+
+// kShaded, of one light each; kOtherLight where they have changed places, or one is lit as another is,
+// which on cloth that does not lie flat only normals show. `signal`: [light][block], dark subtracted.
+// Shadows that take less than `min_light` of all the light of a frame are left aside.
 [[nodiscard]] std::vector<CaptureFault> ShadedFaults(const Rig& rig, const CaptureLooks& looks,
                                                      const std::vector<std::vector<double>>& signal,
                                                      const std::vector<bool>& on,
-                                                     const FrameCheckOptions& options);
+                                                     const FrameCheckOptions& options,
+                                                     double min_light = 0.0);
 
 }  // namespace sateen

@@ -161,10 +161,11 @@ Status CheckLitFrames(const fs::path& path, const CapturePlan& plan) {
     }
     for (const FrameFile& frame : plan.lit[k]) {
       if (!seen.insert(frame.path.lexically_normal()).second) {
-        return Fail(ErrorCode::kBadData,
-                    "{}: is named twice, the second time for light '{}'; need a file for each "
-                    "frame",
-                    frame.path.string(), plan.rig.lights[k].name);
+        return Fail(
+            ErrorCode::kBadData,
+            "{}: is named for two lights or exposures, the second of light '{}'; need a file "
+            "for each",
+            frame.path.string(), plan.rig.lights[k].name);
       }
     }
   }

@@ -59,11 +59,12 @@ Result<std::vector<FrameFile>> FramesOf(const fs::path& dir, const CapturePlan& 
   }
   std::vector<FrameFile> frames;
   for (size_t k = 0; k < plan.lit.size(); ++k) {
-    if (!plan.lit[k]) {
-      return Fail(ErrorCode::kBadData, "{}: has no frame of light '{}'; need one of each light: {}",
-                  dir.string(), plan.rig.lights[k].name, kHowToRender);
+    if (plan.lit[k].size() != 1) {
+      return Fail(ErrorCode::kBadData,
+                  "{}: has {} frames of light '{}'; need one of each light: {}", dir.string(),
+                  plan.lit[k].size(), plan.rig.lights[k].name, kHowToRender);
     }
-    frames.push_back(*plan.lit[k]);
+    frames.push_back(plan.lit[k][0]);
   }
   if (plan.dark.empty()) {
     return Fail(ErrorCode::kBadData, "{}: has no dark frame; {}", dir.string(), kHowToRender);

@@ -64,7 +64,7 @@ TEST(SessionVerify, ExitsWith3AndNamesWhatIsNot) {
   expect("frames/east.exr has no hash");
   session.frames.erase(session.frames.begin());
   testing::WriteText(dir / "session.json", SessionToJson(session));
-  expect("has 0 frames of light 'east'");
+  expect("has no frame of light 'east'");
 }
 
 TEST(SessionVerify, NeedsASession) { EXPECT_EQ(Verify({}).exit_status, 2); }

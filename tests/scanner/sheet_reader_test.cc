@@ -59,8 +59,9 @@ TEST_F(BracketedSheet, TakesEachBlockFromTheLongestExposureThatIsNotSaturated) {
   ASSERT_THAT(sheet.samples[0], SizeIs(12));
   for (size_t i = 0; i < 12; ++i) {
     const bool is_left = sheet.blocks[0][i] % kGrid.columns < 2;
-    EXPECT_NEAR(sheet.samples[0][i].radiance_rgb[1], is_left ? 0.30 / 0.1 : 0.41 / 0.4, 1e-4) << i;
-    EXPECT_NEAR(sheet.samples[1][i].radiance_rgb[1], 0.2 / 0.1, 1e-4) << i;
+    EXPECT_NEAR(sheet.samples[0][i].radiance_rgb[1], is_left ? 0.30 / 0.1 : 0.41 / 0.4, 3e-4)
+        << i;  // 16 bits
+    EXPECT_NEAR(sheet.samples[1][i].radiance_rgb[1], 0.2 / 0.1, 3e-4) << i;
   }
   EXPECT_TRUE(sheet.sha256_of_input.contains((dir_ / "frames/long.png").string()));
 }
