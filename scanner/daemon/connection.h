@@ -15,7 +15,7 @@ struct ConnectionLimits {
   std::chrono::milliseconds read{10'000};
   std::chrono::milliseconds write{10'000};
   // Request line, headers and body together.
-  std::size_t request_bytes = 128 * 1024;
+  std::size_t request_bytes = std::size_t{128} * 1024;
 };
 
 class Connection : public httplib::Stream {

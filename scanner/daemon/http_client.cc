@@ -211,6 +211,7 @@ Result<std::string> DaemonClient::RunJob(const std::string& path, const std::str
 }
 
 Result<std::optional<DaemonClient>> FindDaemon() {
+  // NOLINTNEXTLINE(concurrency-mt-unsafe): nothing in this program sets variables
   const char* const named = std::getenv("SATEEN_SOCKET");
   const std::vector<std::filesystem::path> places =
       named != nullptr

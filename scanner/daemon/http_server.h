@@ -19,7 +19,7 @@ struct HttpServerOptions {
   std::chrono::milliseconds client_time{10'000};
   // How often a stream of events says that it is still there.
   std::chrono::milliseconds heartbeat{5000};
-  std::size_t max_body_bytes = 64 * 1024;
+  std::size_t max_body_bytes = std::size_t{64} * 1024;
   int max_connections = 64;  // each has a thread; the next one is told 503
   int max_streams = 16;      // of them, those that follow events
 };

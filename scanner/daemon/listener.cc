@@ -170,6 +170,7 @@ Listener::~Listener() {
 }
 
 std::filesystem::path DefaultSocketPath() {
+  // NOLINTNEXTLINE(concurrency-mt-unsafe): nothing in this program sets variables
   const char* const folder = std::getenv("XDG_RUNTIME_DIR");
   return folder != nullptr && *folder != '\0' ? std::filesystem::path(folder) / "sateen.sock"
                                               : "/run/sateen/sateen.sock";
