@@ -22,7 +22,7 @@ struct SolveArgs {
   std::string mask_file;  // empty: the capture's own
   std::string encoding = "auto";
   std::string backend = "auto";
-  std::string robust = "none";
+  std::string robust = "auto";
   std::string normal_y = "up";
   LambertianOptions solver;
   int threads = 0;
