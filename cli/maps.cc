@@ -66,6 +66,13 @@ Status StageMaps(const NormalField& field, const LightFrame& first_frame,
   then([&] { return WriteExr(folder.Stage("residual.exr"), field.residual); });
   then([&] { return WritePng8(folder.Stage("samples.png"), field.samples); });
   then([&] { return WritePng8(folder.Stage("reason.png"), field.reason); });
+  if (!field.model.pixels.empty()) {
+    then([&] { return WriteExr(folder.Stage("uncertainty.exr"), field.uncertainty); });
+    then([&] { return WritePng8(folder.Stage("model.png"), field.model); });
+  } else {
+    folder.Retire("uncertainty.exr");
+    folder.Retire("model.png");
+  }
   if (angular_error_deg) {
     then([&] { return WriteExr(folder.Stage("error.exr"), *angular_error_deg); });
   } else {

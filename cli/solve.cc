@@ -10,6 +10,7 @@
 #include "cli/maps.h"
 #include "cli/solve_report.h"
 #include "core/output_folder.h"
+#include "solver/ladder.h"
 #include "solver/undistort.h"
 
 namespace sateen::cli {
@@ -178,6 +179,18 @@ Status StageAll(const SolveArgs& args, const SolveOutcome& outcome,
   });
 }
 
+Result<NormalField> SolveStack(const SolveArgs& args, const LambertianOptions& least_squares,
+                               const Capture& capture, const Task& task) {
+  const std::optional<LadderMode> mode = LadderModeNamed(args.robust);
+  if (!mode) {
+    return SolveLambertian(capture.stack, capture.rig, capture.mask, least_squares, task);
+  }
+  return SolveLadder(
+      capture.stack, capture.rig, capture.mask,
+      {.mode = *mode, .least_squares = least_squares, .noise = NoiseOf(capture.stack, capture.rig)},
+      task);
+}
+
 // Reads, solves, compares and writes. Nothing is left behind where any of it fails.
 Result<SolveOutcome> SolveCapture(const SolveArgs& args, const Task& task, std::ostream& log) {
   const Clock::time_point start = Clock::now();
@@ -205,8 +218,7 @@ Result<SolveOutcome> SolveCapture(const SolveArgs& args, const Task& task, std::
   if (!folder) {
     return tl::unexpected(folder.error());
   }
-  Result<NormalField> field = SolveLambertian(outcome.capture.stack, outcome.capture.rig,
-                                              outcome.capture.mask, options, task);
+  Result<NormalField> field = SolveStack(args, options, outcome.capture, task);
   if (!field) {
     return tl::unexpected(field.error());
   }
@@ -272,8 +284,12 @@ void AddSolve(CLI::App& root, SolveArgs& args) {
                   "where fast is not exact enough")
       ->check(CLI::IsMember({"auto", "fast", "jacobi-svd", "qr", "ldlt"}))
       ->capture_default_str();
-  cmd->add_option("--robust", args.robust, "Robust estimator for samples off the Lambertian model")
-      ->check(CLI::IsMember({"none"}))
+  cmd->add_option(
+         "--robust", args.robust,
+         "What to do about samples off the Lambertian model. auto: each pixel takes the "
+         "lowest rung that explains it; least-squares, robust: that rung everywhere; none: "
+         "least squares without weights and without uncertainty")
+      ->check(CLI::IsMember({"auto", "least-squares", "robust", "none"}))
       ->capture_default_str();
   cmd->add_option("--shadow-level", args.solver.shadow_level,
                   "Leave out samples at or below this fraction of the pixel's brightest [0, 1)")

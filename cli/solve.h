@@ -23,7 +23,7 @@ struct SolveArgs {
   std::string truth_dir;  // empty: what lies beside the capture
   std::string encoding = "auto";
   std::string backend = "auto";
-  std::string robust = "none";
+  std::string robust = "auto";
   std::string normal_y = "up";
   LambertianOptions solver;
   int threads = 0;

@@ -41,6 +41,45 @@ std::string UnsolvedWords(const SolveSummary& summary) {
   return words;
 }
 
+nlohmann::json ToJson(const RungSummary& rung) {
+  return {{"pixels", rung.pixels},
+          {"seconds", rung.seconds},
+          {"mean_uncertainty_deg", rung.mean_uncertainty_deg}};
+}
+
+nlohmann::json LadderToJson(const SolveSummary& summary) {
+  nlohmann::json robust = ToJson(summary.robust);
+  robust["turned_deg"] = summary.turned_deg;
+  robust["unexplained"] = summary.unexplained;
+  nlohmann::json least_squares = ToJson(summary.least_squares);
+  least_squares["unchecked"] = summary.unchecked;
+  return {{"noise", summary.noise_known ? "known" : "estimated"},
+          {"noise_scale", summary.noise_scale},
+          {"least_squares", std::move(least_squares)},
+          {"robust", std::move(robust)}};
+}
+
+// What each rung did, a line each.
+std::string LadderWords(const SolveSummary& summary) {
+  const auto rung = [](std::string_view name, const RungSummary& of) {
+    return fmt::format("{}: {} pixels in {:.3f} s, mean uncertainty {:.2g} degrees", name,
+                       of.pixels, of.seconds, of.mean_uncertainty_deg);
+  };
+  std::string text = rung("least squares", summary.least_squares);
+  if (summary.unchecked > 0) {
+    text += fmt::format("; {} with 3 samples, which nothing checks", summary.unchecked);
+  }
+  text += '\n' + rung("robust", summary.robust);
+  if (summary.robust.pixels > 0) {
+    text +=
+        fmt::format("; it turned their normals by {:.3g} degrees in the mean", summary.turned_deg);
+  }
+  if (summary.unexplained > 0) {
+    text += fmt::format("; {} unexplained (see model.png)", summary.unexplained);
+  }
+  return text + '\n';
+}
+
 // "auto (AVX3)", or "qr", which is not vectorised by us.
 std::string BackendWords(const SolveSummary& summary) {
   return summary.instruction_set.empty()
@@ -77,6 +116,9 @@ std::string JsonReport(const SolveArgs& args, const SolveOutcome& outcome) {
                            {"options", OptionsToJson(args)},
                            {"warnings", outcome.capture.warnings},
                            {"inputs", outcome.capture.sha256_of_input}};
+  if (args.robust != "none") {
+    report["ladder"] = LadderToJson(summary);
+  }
   if (outcome.angular_error_deg) {
     report["truth"] = outcome.capture.truth->source;
     report["angular_error_deg"] = ToJson(*outcome.angular_error_deg);
@@ -109,6 +151,9 @@ std::string TextReport(const SolveArgs& args, const SolveOutcome& outcome) {
       summary.seconds, summary.threads, summary.threads == 1 ? "" : "s", BackendWords(summary));
   if (const std::string words = UnsolvedWords(summary); !words.empty()) {
     text += fmt::format("unsolved: {} (see reason.png)\n", words);
+  }
+  if (args.robust != "none") {
+    text += LadderWords(summary);
   }
   if (outcome.angular_error_deg) {
     const ErrorStatistics& error = *outcome.angular_error_deg;

@@ -19,6 +19,10 @@ struct KernelLight {
   std::array<float, 3> inverse_flux = {};  // distant: 1 / phi; otherwise 1 / (phi 1e6 mm^2)
   float clip = 0.0F;                       // radiance at or above is saturated
   float dark = 0.0F;                       // radiance above is not dark
+  // Variance of one sample of radiance i: shot i + read_squared, red, green, blue. For
+  // SolveWeightedSpan alone.
+  std::array<float, 3> shot = {};
+  std::array<float, 3> read_squared = {};
 };
 
 struct KernelParams {
@@ -47,6 +51,12 @@ struct KernelOutput {
   float* residual = nullptr;
   uint8_t* samples = nullptr;
   uint8_t* reason = nullptr;
+  // SolveWeightedSpan and SolveConsensusSpan.
+  float* uncertainty = nullptr;  // degrees
+  // SolveWeightedSpan: chi^2 over its degrees of freedom, 0 where there is none.
+  float* misfit = nullptr;
+  // SolveConsensusSpan: usable samples that agree with the normal.
+  uint8_t* agreeing = nullptr;
 };
 
 // Bound on cond(L^T L) up to which kFast answers: a true cond(L) of about 14. There, on noiseless
@@ -65,6 +75,17 @@ inline constexpr float kFloatConditionSquared = 400.0F;
 /// two first, subnormal numbers by integer arithmetic, because floating-point assists for them
 /// cost a hundred times the solve.
 void SolveSpan(const KernelParams& params, const KernelInput& input, const KernelOutput& output);
+
+/// The same, then one step to the normal that has the samples' noise for weights (equations (1) to
+/// (5) of solver/ladder.h); `uncertainty` and `misfit` must be there. Costs 1.7 times SolveSpan.
+void SolveWeightedSpan(const KernelParams& params, const KernelInput& input,
+                       const KernelOutput& output);
+
+/// Equations (6) to (11) of solver/ladder.h, for pixels that least squares do not explain.
+/// `uncertainty` and `agreeing` must be there, `misfit` is not touched; pixels without an answer
+/// are not kSolved. x_mm and y_mm must be there, also for distant lights.
+void SolveConsensusSpan(const KernelParams& params, const KernelInput& input,
+                        const KernelOutput& output);
 
 // Sums the same planes and writes the same outputs, nothing else: the memory bandwidth that the
 // access pattern of SolveSpan allows.

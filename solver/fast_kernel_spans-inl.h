@@ -24,6 +24,10 @@ HWY_INLINE void StoreUnsolved(size_t offset, const KernelOutput& output) {
     hn::StoreU(hn::Zero(d), d, output.albedo[c] + offset);
   }
   hn::StoreU(hn::Zero(d), d, output.residual + offset);
+  if (output.uncertainty != nullptr) {
+    hn::StoreU(hn::Zero(d), d, output.uncertainty + offset);
+    hn::StoreU(hn::Zero(d), d, output.misfit + offset);
+  }
   StoreBytes(hn::Zero(DI()), output.samples + offset);
   StoreBytes(hn::Set(DI(), static_cast<int32_t>(Reason::kOutsideMask)), output.reason + offset);
 }
@@ -81,25 +85,37 @@ HWY_INLINE void ForEachVector(const KernelParams& params, const KernelInput& inp
     }
   }
   tail.inverse_gains = gains.data();
-  std::vector<uint8_t> bytes(3 * lanes, 0);
+  std::vector<uint8_t> bytes(4 * lanes, 0);
   std::fill_n(bytes.begin(), rest, uint8_t{1});
   if (input.mask != nullptr) {
     std::copy_n(input.mask + whole, rest, bytes.begin());
   }
   tail.mask = bytes.data();
-  std::vector<float> results(7 * lanes);
+  std::vector<float> results(9 * lanes);
   const auto result = [&](size_t index) { return results.data() + index * lanes; };
   solve(tail, 0,
         KernelOutput{{result(0), result(1), result(2)},
                      {result(3), result(4), result(5)},
                      result(6),
                      bytes.data() + lanes,
-                     bytes.data() + 2 * lanes});
+                     bytes.data() + 2 * lanes,
+                     result(7),
+                     result(8),
+                     bytes.data() + 3 * lanes});
   for (size_t c = 0; c < 3; ++c) {
     std::copy_n(result(c), rest, output.normal[c] + whole);
     std::copy_n(result(3 + c), rest, output.albedo[c] + whole);
   }
   std::copy_n(result(6), rest, output.residual + whole);
+  if (output.uncertainty != nullptr) {
+    std::copy_n(result(7), rest, output.uncertainty + whole);
+  }
+  if (output.misfit != nullptr) {
+    std::copy_n(result(8), rest, output.misfit + whole);
+  }
+  if (output.agreeing != nullptr) {
+    std::copy_n(bytes.data() + 3 * lanes, rest, output.agreeing + whole);
+  }
   std::copy_n(bytes.data() + lanes, rest, output.samples + whole);
   std::copy_n(bytes.data() + 2 * lanes, rest, output.reason + whole);
 }

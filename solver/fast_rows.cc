@@ -29,10 +29,15 @@ double FluxScale(const Lights& lights) {
   return std::exp2(std::round(sum / static_cast<double>(lights.size())));
 }
 
+std::array<float, 3> Floats(const std::array<double, 3>& values) {
+  return {static_cast<float>(values[0]), static_cast<float>(values[1]),
+          static_cast<float>(values[2])};
+}
+
 bool HasField(const Light& light) { return light.model == LightModel::kLedField; }
 
-KernelLight KernelLightOf(const Light& light, const LightFrame& frame, double flux_scale,
-                          const LambertianOptions& options) {
+KernelLight KernelLightOf(const Light& light, const LightFrame& frame, const SampleNoise& noise,
+                          double flux_scale, const LambertianOptions& options) {
   const bool distant = light.model == LightModel::kDistant;
   const Eigen::Vector3f place = (distant ? light.direction : light.position_mm).cast<float>();
   const Eigen::Vector3f axis = light.axis.cast<float>();
@@ -44,7 +49,10 @@ KernelLight KernelLightOf(const Light& light, const LightFrame& frame, double fl
           .anisotropy = static_cast<float>(light.anisotropy),
           .inverse_flux = {inverse_flux.x(), inverse_flux.y(), inverse_flux.z()},
           .clip = ClipThreshold(frame, options),
-          .dark = DarkThreshold(frame, options)};
+          .dark = DarkThreshold(frame, options),
+          .shot = Floats(noise.shot),
+          .read_squared = Floats({noise.read[0] * noise.read[0], noise.read[1] * noise.read[1],
+                                  noise.read[2] * noise.read[2]})};
 }
 
 }  // namespace
@@ -61,7 +69,8 @@ size_t BytesPerPixel(size_t light_count) {
 }
 
 Result<FastRows> FastRows::Make(const LightStack& stack, const Rig& rig,
-                                const std::optional<Mask>& mask, const LambertianOptions& options) {
+                                const std::optional<Mask>& mask, const LambertianOptions& options,
+                                const StackNoise* noise) {
   FastRows rows(stack, mask);
   if (!AllDistant(rig.lights)) {
     Result<TableGrid> grid = TableGrid::Make(*rig.camera);
@@ -83,27 +92,34 @@ Result<FastRows> FastRows::Make(const LightStack& stack, const Rig& rig,
   const double flux_scale = FluxScale(rig.lights);
   rows.params_.result_scale = static_cast<float>(1.0 / flux_scale);
   for (size_t k = 0; k < stack.size(); ++k) {
-    rows.params_.lights.push_back(KernelLightOf(rig.lights[k], stack[k], flux_scale, options));
+    rows.params_.lights.push_back(KernelLightOf(
+        rig.lights[k], stack[k], noise ? (*noise)[k] : SampleNoise{}, flux_scale, options));
   }
   return rows;
 }
 
-void FastRows::Solve(int begin, int end, NormalField& field) const {
-  std::vector<float> x_mm;
-  std::vector<float> y_mm;
+FastRows::RowGeometry FastRows::GeometryOf(int begin, int end) const {
+  RowGeometry geometry;
   if (grid_) {
-    const auto width = static_cast<size_t>(field.reason.width);
-    x_mm.resize(width * static_cast<size_t>(end - begin));
-    y_mm.resize(x_mm.size());
+    const auto width = static_cast<size_t>((*stack_)[0].rgb[0].width);
+    geometry.x_mm.resize(width * static_cast<size_t>(end - begin));
+    geometry.y_mm.resize(geometry.x_mm.size());
     for (int row = begin; row < end; ++row) {
       const size_t start = width * static_cast<size_t>(row - begin);
-      grid_->Row(row, std::span(x_mm).subspan(start, width), std::span(y_mm).subspan(start, width));
+      grid_->Row(row, std::span(geometry.x_mm).subspan(start, width),
+                 std::span(geometry.y_mm).subspan(start, width));
     }
   }
-  std::vector<float> gains;
-  std::vector<const float*> places;
-  FillGains(begin, end, gains, places);
-  Run(SolveSpan, begin, end, x_mm, y_mm, places.empty() ? nullptr : places.data(), field);
+  FillGains(begin, end, geometry.gains, geometry.places);
+  return geometry;
+}
+
+void FastRows::Solve(int begin, int end, NormalField& field) const {
+  Run(SolveSpan, begin, end, GeometryOf(begin, end), field, nullptr);
+}
+
+void FastRows::SolveWeighted(int begin, int end, NormalField& field, Image<float>& misfit) const {
+  Run(SolveWeightedSpan, begin, end, GeometryOf(begin, end), field, &misfit);
 }
 
 void FastRows::FillGains(int begin, int end, std::vector<float>& gains,
@@ -128,12 +144,11 @@ void FastRows::FillGains(int begin, int end, std::vector<float>& gains,
 }
 
 void FastRows::Touch(int begin, int end, NormalField& field) const {
-  Run(TouchSpan, begin, end, {}, {}, nullptr, field);
+  Run(TouchSpan, begin, end, {}, field, nullptr);
 }
 
-void FastRows::Run(SpanFunction function, int begin, int end, std::span<const float> x_mm,
-                   std::span<const float> y_mm, const float* const* inverse_gains,
-                   NormalField& field) const {
+void FastRows::Run(SpanFunction function, int begin, int end, const RowGeometry& geometry,
+                   NormalField& field, Image<float>* misfit) const {
   const size_t first = field.reason.Index(0, begin);
   const size_t count = field.reason.Index(0, end) - first;
   std::vector<const float*> planes;
@@ -145,16 +160,77 @@ void FastRows::Run(SpanFunction function, int begin, int end, std::span<const fl
   const auto at = [&](auto& image) { return image.pixels.data() + first; };
   function(params_,
            {.planes = planes.data(),
-            .x_mm = x_mm.empty() ? nullptr : x_mm.data(),
-            .y_mm = y_mm.empty() ? nullptr : y_mm.data(),
-            .inverse_gains = inverse_gains,
+            .x_mm = geometry.x_mm.empty() ? nullptr : geometry.x_mm.data(),
+            .y_mm = geometry.y_mm.empty() ? nullptr : geometry.y_mm.data(),
+            .inverse_gains = geometry.places.empty() ? nullptr : geometry.places.data(),
             .mask = *mask_ ? at(**mask_) : nullptr,
             .count = count},
-           {{at(field.normal[0]), at(field.normal[1]), at(field.normal[2])},
-            {at(field.albedo[0]), at(field.albedo[1]), at(field.albedo[2])},
-            at(field.residual),
-            at(field.samples),
-            at(field.reason)});
+           {.normal = {at(field.normal[0]), at(field.normal[1]), at(field.normal[2])},
+            .albedo = {at(field.albedo[0]), at(field.albedo[1]), at(field.albedo[2])},
+            .residual = at(field.residual),
+            .samples = at(field.samples),
+            .reason = at(field.reason),
+            .uncertainty = misfit != nullptr ? at(field.uncertainty) : nullptr,
+            .misfit = misfit != nullptr ? at(*misfit) : nullptr});
+}
+
+void FastRows::SolveConsensus(int begin, int end, std::span<const size_t> pixels,
+                              NormalField& field, std::span<uint8_t> agreeing) const {
+  const size_t first = field.reason.Index(0, begin);
+  const size_t count = pixels.size();
+  const RowGeometry geometry = GeometryOf(begin, end);
+  // The listed pixels side by side, so that every lane of a vector has work.
+  std::vector<float> gathered((4 * stack_->size() + 2) * count, 0.0F);
+  size_t next = 0;
+  const auto gather = [&](const float* from, size_t shift) -> const float* {
+    float* const to = gathered.data() + next;
+    next += count;
+    for (size_t j = 0; from != nullptr && j < count; ++j) {
+      to[j] = from[pixels[j] - shift];
+    }
+    return to;
+  };
+  std::vector<const float*> planes;
+  std::vector<const float*> gains(stack_->size(), nullptr);
+  for (size_t k = 0; k < stack_->size(); ++k) {
+    for (const Image<float>& plane : (*stack_)[k].rgb.planes) {
+      planes.push_back(gather(plane.pixels.data(), 0));
+    }
+    if (!geometry.places.empty() && geometry.places[k] != nullptr) {
+      gains[k] = gather(geometry.places[k], first);
+    }
+  }
+  const auto position = [&](const std::vector<float>& of_rows) {
+    return gather(of_rows.empty() ? nullptr : of_rows.data(), first);
+  };
+  const KernelInput input{.planes = planes.data(),
+                          .x_mm = position(geometry.x_mm),
+                          .y_mm = position(geometry.y_mm),
+                          .inverse_gains = gains.data(),
+                          .count = count};
+  std::vector<float> results(8 * count);
+  std::vector<uint8_t> bytes(2 * count);
+  const auto result = [&](size_t index) { return results.data() + index * count; };
+  SolveConsensusSpan(params_, input,
+                     {.normal = {result(0), result(1), result(2)},
+                      .albedo = {result(3), result(4), result(5)},
+                      .residual = result(6),
+                      .samples = bytes.data(),
+                      .reason = bytes.data() + count,
+                      .uncertainty = result(7),
+                      .agreeing = agreeing.data()});
+  for (size_t j = 0; j < count; ++j) {
+    if (bytes[count + j] != static_cast<uint8_t>(Reason::kSolved)) {
+      agreeing[j] = 0;
+      continue;
+    }
+    for (size_t c = 0; c < 3; ++c) {
+      field.normal[c].pixels[pixels[j]] = result(c)[j];
+      field.albedo[c].pixels[pixels[j]] = result(3 + c)[j];
+    }
+    field.residual.pixels[pixels[j]] = result(6)[j];
+    field.uncertainty.pixels[pixels[j]] = result(7)[j];
+  }
 }
 
 Status TouchAllRows(const FastRows& rows, ImageSize size, const Task& task, NormalField& field) {

@@ -10,6 +10,7 @@
 #include "solver/fast_kernel.h"
 #include "solver/gain_rows.h"
 #include "solver/lambertian.h"
+#include "solver/noise.h"
 
 namespace sateen {
 
@@ -20,21 +21,37 @@ class FastRows {
   // kBadData where a near light needs table positions and a pixel does not see the table.
   [[nodiscard]] static Result<FastRows> Make(const LightStack& stack, const Rig& rig,
                                              const std::optional<Mask>& mask,
-                                             const LambertianOptions& options);
+                                             const LambertianOptions& options,
+                                             const StackNoise* noise = nullptr);
 
   // Solves rows [begin, end) into `field`; refused pixels are kIllConditioned.
   void Solve(int begin, int end, NormalField& field) const;
+  // With weights, for which there must be noise: also field.uncertainty and `misfit`.
+  void SolveWeighted(int begin, int end, NormalField& field, Image<float>& misfit) const;
+  // Rung 2 for the pixels of rows [begin, end) that are listed by index, into `field`. The others'
+  // content stays, and so does that of a listed pixel without an answer. `agreeing`, of as many
+  // entries, receives how many samples agree, 0 without an answer.
+  void SolveConsensus(int begin, int end, std::span<const size_t> pixels, NormalField& field,
+                      std::span<uint8_t> agreeing) const;
   // Reads and writes the same bytes and only adds them up: the floor of Solve.
   void Touch(int begin, int end, NormalField& field) const;
 
  private:
   using SpanFunction = void (*)(const KernelParams&, const KernelInput&, const KernelOutput&);
 
+  // Table positions and gains of rows [begin, end), as far as the lights need them.
+  struct RowGeometry {
+    std::vector<float> x_mm;
+    std::vector<float> y_mm;
+    std::vector<float> gains;
+    std::vector<const float*> places;  // of each light's gains, or null
+  };
+
   FastRows(const LightStack& stack, const std::optional<Mask>& mask)
       : stack_(&stack), mask_(&mask) {}
-  void Run(SpanFunction function, int begin, int end, std::span<const float> x_mm,
-           std::span<const float> y_mm, const float* const* inverse_gains,
-           NormalField& field) const;
+  [[nodiscard]] RowGeometry GeometryOf(int begin, int end) const;
+  void Run(SpanFunction function, int begin, int end, const RowGeometry& geometry,
+           NormalField& field, Image<float>* misfit) const;
   // 1 / g of rows [begin, end) for each light that has a field: `gains` holds them, `places` where.
   void FillGains(int begin, int end, std::vector<float>& gains,
                  std::vector<const float*>& places) const;

@@ -10,6 +10,8 @@
 #include "core/parallel.h"
 #include "solver/fast_kernel.h"
 #include "solver/fast_rows.h"
+#include "solver/least_squares.h"
+#include "solver/plain_ladder.h"
 #include "solver/reference_backends.h"
 
 namespace sateen {
@@ -141,28 +143,52 @@ void ClearRows(const std::optional<Mask>& mask, int row_begin, int row_end, Norm
   }
 }
 
-Status SolveAllRows(const LightStack& stack, const Rig& rig, const std::optional<Mask>& mask,
-                    const LambertianOptions& options, const std::optional<FastRows>& fast_rows,
-                    const Task& task, NormalField& field) {
-  const ImageSize size = stack[0].rgb.Size();
+// One solve: what is asked, and what of it the fast backends need.
+struct Job {
+  const LightStack& stack;
+  const Rig& rig;
+  const std::optional<Mask>& mask;
+  const LambertianOptions& options;
+  const StackNoise* noise;  // null: without weights
+  std::optional<FastRows> fast_rows;
+};
+
+// The rows of one piece, into `field` and `misfit`; returns how many pixels the fast backend left.
+int64_t SolveRowsOf(const Job& job, int begin, int end, NormalField& field, Image<float>* misfit) {
+  if (!job.fast_rows) {
+    ClearRows(job.mask, begin, end, field);
+  } else if (job.noise != nullptr) {
+    job.fast_rows->SolveWeighted(begin, end, field, *misfit);
+  } else {
+    job.fast_rows->Solve(begin, end, field);
+  }
+  if (job.options.backend == Backend::kFast) {
+    return 0;
+  }
+  const int64_t pending = CountRows(kPending, begin, end, field);
+  if (pending == 0) {
+    return 0;
+  }
+  if (job.noise != nullptr) {
+    MarkPending(kPending, begin, end, field, *misfit);
+  }
+  SolveRowsInDouble(job.stack, job.rig, job.options,
+                    job.fast_rows ? Backend::kJacobiSvd : job.options.backend, kPending, begin, end,
+                    field);
+  if (job.noise != nullptr) {
+    WeighRowsInDouble(job.stack, job.rig, job.options, *job.noise, begin, end, field, *misfit);
+  }
+  return job.fast_rows ? pending : 0;
+}
+
+Status SolveAllRows(const Job& job, const Task& task, NormalField& field, Image<float>* misfit) {
+  const ImageSize size = job.stack[0].rgb.Size();
   // One for each piece, at the place of its first row; summed up in order.
   std::vector<SolveSummary> pieces(static_cast<size_t>(size.height));
   task.BeginStage("solving", size.height);
   Status status = ParallelFor(size.height, RowsPerPiece(size), task, [&](int begin, int end) {
     SolveSummary& piece = pieces[static_cast<size_t>(begin)];
-    if (fast_rows) {
-      fast_rows->Solve(begin, end, field);
-    } else {
-      ClearRows(mask, begin, end, field);
-    }
-    if (options.backend != Backend::kFast) {
-      const int64_t pending = CountRows(kPending, begin, end, field);
-      if (pending > 0) {
-        SolveRowsInDouble(stack, rig, options, fast_rows ? Backend::kJacobiSvd : options.backend,
-                          kPending, begin, end, field);
-      }
-      piece.resolved_by_reference = fast_rows ? pending : 0;
-    }
+    piece.resolved_by_reference = SolveRowsOf(job, begin, end, field, misfit);
     CountReasons(begin, end, field, piece);
   });
   for (const SolveSummary& piece : pieces) {
@@ -226,25 +252,35 @@ void NormalField::Resize(ImageSize size) {
   reason = Image<uint8_t>(size);
 }
 
-Status SolveLambertianInto(const LightStack& stack, const Rig& rig, const std::optional<Mask>& mask,
-                           const LambertianOptions& options, const Task& task, NormalField& field) {
+Status SolveLeastSquaresInto(const LightStack& stack, const Rig& rig,
+                             const std::optional<Mask>& mask, const LambertianOptions& options,
+                             const StackNoise* noise, const Task& task, NormalField& field,
+                             Image<float>* misfit) {
   const auto start = std::chrono::steady_clock::now();
   if (Status status =
           options.Validate().and_then([&] { return CheckInputs(stack, rig, mask, options); });
       !status) {
     return status;
   }
-  std::optional<FastRows> fast_rows;
+  Job job{stack, rig, mask, options, noise, std::nullopt};
   if (options.backend == Backend::kFast || options.backend == Backend::kAuto) {
-    Result<FastRows> made = FastRows::Make(stack, rig, mask, options);
+    Result<FastRows> made = FastRows::Make(stack, rig, mask, options, noise);
     if (!made) {
       return tl::unexpected(made.error());
     }
-    fast_rows = std::move(*made);
+    job.fast_rows = std::move(*made);
   }
-  field.Resize(stack[0].rgb.Size());
+  const ImageSize size = stack[0].rgb.Size();
+  field.Resize(size);
+  if (noise == nullptr) {
+    field.uncertainty = {};
+    field.model = {};
+  } else if (field.model.Size() != size) {
+    field.uncertainty = Image<float>(size);
+    field.model = Image<uint8_t>(size);
+  }
   field.summary = {};
-  if (Status status = SolveAllRows(stack, rig, mask, options, fast_rows, task, field); !status) {
+  if (Status status = SolveAllRows(job, task, field, misfit); !status) {
     return status;
   }
   SolveSummary& summary = field.summary;
@@ -252,11 +288,16 @@ Status SolveLambertianInto(const LightStack& stack, const Rig& rig, const std::o
                    summary.ill_conditioned;
   summary.threads = task.ThreadCount();
   summary.backend = options.backend;
-  if (fast_rows) {
+  if (job.fast_rows) {
     summary.instruction_set = KernelInstructionSet();
   }
   summary.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return {};
+}
+
+Status SolveLambertianInto(const LightStack& stack, const Rig& rig, const std::optional<Mask>& mask,
+                           const LambertianOptions& options, const Task& task, NormalField& field) {
+  return SolveLeastSquaresInto(stack, rig, mask, options, nullptr, task, field, nullptr);
 }
 
 Result<NormalField> SolveLambertian(const LightStack& stack, const Rig& rig,

@@ -55,6 +55,22 @@ struct LambertianOptions {
   [[nodiscard]] Status Validate() const;
 };
 
+// What a pixel's normal comes from. The values are what model.png holds.
+enum class Rung : uint8_t {
+  kNone = 0,           // unsolved, or solved by SolveLambertian, which has no ladder
+  kLeastSquares = 64,  // weighted least squares explain the samples
+  kUnchecked = 96,     // the same with three samples, so that no residual is left to tell
+  kConsensus = 128,    // samples that agree, against others that do not
+  kUnexplained = 255   // fewer than four samples agree: do not trust
+};
+
+// What one rung of the ladder did.
+struct RungSummary {
+  int64_t pixels = 0;  // that it gave the answer of
+  double seconds = 0.0;
+  double mean_uncertainty_deg = 0.0;
+};
+
 struct SolveSummary {
   int64_t pixels = 0;  // inside the mask
   int64_t solved = 0;
@@ -63,6 +79,14 @@ struct SolveSummary {
   int64_t saturated = 0;
   int64_t ill_conditioned = 0;
   int64_t resolved_by_reference = 0;  // kAuto: refused by kFast, given to kJacobiSvd
+  // SolveLadder alone. `robust` counts kUnexplained, too.
+  RungSummary least_squares;
+  RungSummary robust;
+  int64_t unexplained = 0;
+  int64_t unchecked = 0;
+  double turned_deg = 0.0;   // mean angle by which rung 2 turned its pixels' normals
+  double noise_scale = 0.0;  // s of solver/ladder.h; 0 without a ladder
+  bool noise_known = false;
   double seconds = 0.0;
   int threads = 0;
   Backend backend = Backend::kAuto;
@@ -75,6 +99,9 @@ struct NormalField {
   Image<float> residual;   // RMS of equation (3) over the usable samples; zero where unsolved
   Image<uint8_t> samples;  // usable samples, 255 = 255 or more
   Image<uint8_t> reason;   // of type Reason
+  // SolveLadder alone; SolveLambertian leaves them empty.
+  Image<float> uncertainty;  // degrees, one standard deviation of the normal's angle
+  Image<uint8_t> model;      // of type Rung
   SolveSummary summary;
 
   // Reallocates where the size differs; the content is not defined until a solve.

@@ -26,7 +26,9 @@ PixelSystem::PixelSystem(const LightStack& stack, const Rig& rig, const Lamberti
           std::any_of(rig.lights.begin(), rig.lights.end(),
                       [](const Light& light) { return light.model != LightModel::kDistant; })),
       l_(static_cast<Eigen::Index>(stack.size()), 3),
-      rhs_(static_cast<Eigen::Index>(stack.size()), 4) {}
+      rhs_(static_cast<Eigen::Index>(stack.size()), 4),
+      e_(static_cast<Eigen::Index>(stack.size()), 3),
+      frames_(stack.size()) {}
 
 std::optional<Eigen::Vector3d> PixelSystem::TablePoint(int column, int row) const {
   if (!needs_position_) {
@@ -65,6 +67,8 @@ void PixelSystem::Gather(int column, int row) {
     brightest = std::max(brightest, luminance);
     l_.row(count_) = incident.l.transpose();
     rhs_.row(count_) << scaled.transpose(), luminance;
+    e_.row(count_) = incident.e_rgb.transpose();
+    frames_[static_cast<size_t>(count_)] = static_cast<int>(k);
     ++count_;
   }
   const double shadow = options_.shadow_level * brightest;
@@ -74,6 +78,8 @@ void PixelSystem::Gather(int column, int row) {
     if (rhs_(k, 3) > shadow) {
       l_.row(count_) = l_.row(k).eval();
       rhs_.row(count_) = rhs_.row(k).eval();
+      e_.row(count_) = e_.row(k).eval();
+      frames_[static_cast<size_t>(count_)] = frames_[static_cast<size_t>(k)];
       ++count_;
     }
   }

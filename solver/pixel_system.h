@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <optional>
+#include <vector>
 
 #include "imaging/light_stack.h"
 #include "rig/rig.h"
@@ -25,6 +26,13 @@ class PixelSystem {
   [[nodiscard]] auto L() const { return l_.topRows(count_); }
   // Count() x 4: i'_kr, i'_kg, i'_kb, i'_k.
   [[nodiscard]] auto Rhs() const { return rhs_.topRows(count_); }
+  // Count() x 3: e_kr, e_kg, e_kb.
+  [[nodiscard]] auto E() const { return e_.topRows(count_); }
+  // Which frame a usable sample is of.
+  [[nodiscard]] int FrameOf(Eigen::Index sample) const {
+    return frames_[static_cast<size_t>(sample)];
+  }
+  [[nodiscard]] double ShadowLevel() const { return options_.shadow_level; }
 
  private:
   std::optional<Eigen::Vector3d> TablePoint(int column, int row) const;
@@ -35,6 +43,8 @@ class PixelSystem {
   bool needs_position_ = false;
   Eigen::MatrixXd l_;
   Eigen::MatrixXd rhs_;
+  Eigen::MatrixX3d e_;
+  std::vector<int> frames_;
   int count_ = 0;
   int saturated_ = 0;
   bool bright_ = false;

@@ -125,6 +125,12 @@ void Resample(const NormalField& field, const Place& place, int column, int row,
     result.albedo[c].At(column, row) = static_cast<float>(std::max(0.0, read(field.albedo[c])));
   }
   result.residual.At(column, row) = static_cast<float>(Linear(field.residual, place));
+  if (!field.model.pixels.empty()) {
+    result.uncertainty.At(column, row) = static_cast<float>(Linear(field.uncertainty, place));
+    result.model.At(column, row) =
+        field.model.At(std::min(place.NearestX(), field.model.width - 1),
+                       std::min(place.NearestY(), field.model.height - 1));
+  }
 }
 
 Status CheckSize(ImageSize size, const Camera& camera) {
@@ -161,6 +167,10 @@ Result<NormalField> Undistorted(const NormalField& field, const Camera& camera, 
   result.residual = Image<float>(size);
   result.samples = Image<uint8_t>(size);
   result.reason = Image<uint8_t>(size, static_cast<uint8_t>(Reason::kOutsideMask));
+  if (!field.model.pixels.empty()) {
+    result.uncertainty = Image<float>(size);
+    result.model = Image<uint8_t>(size);
+  }
   const Status done = CheckSize(field.reason.Size(), camera).and_then([&] {
     return ForEachPlace(camera, task, [&](int column, int row, const Place& place) {
       Resample(field, place, column, row, result);

@@ -1,0 +1,97 @@
+#pragma once
+
+#include <optional>
+#include <string_view>
+
+#include "solver/lambertian.h"
+#include "solver/noise.h"
+
+namespace sateen {
+
+enum class LadderMode {
+  kAuto,          // each pixel takes the lowest rung that explains its samples
+  kLeastSquares,  // rung 1 on every pixel
+  kConsensus      // rung 2 on every pixel
+};
+
+// "auto", "least-squares", "robust".
+[[nodiscard]] std::string_view Name(LadderMode mode);
+[[nodiscard]] std::optional<LadderMode> LadderModeNamed(std::string_view name);
+
+struct LadderOptions {
+  LadderMode mode = LadderMode::kAuto;
+  LambertianOptions least_squares;
+  // Noise of each frame; nothing: shot noise of a gain that is measured on the residuals.
+  std::optional<StackNoise> noise;
+  // A pixel climbs where noise alone would give its residual less often than this. In (0, 0.5).
+  double false_alarms = 1e-3;
+  // ... and where the residual is above this fraction of the albedo, which no calibration explains
+  // better. [0, 1).
+  double explained_residual = 0.002;
+
+  // Names the first field out of range, with its value and its range.
+  [[nodiscard]] Status Validate() const;
+};
+
+/// Surface normal, albedo and uncertainty per pixel, by the lowest rung that explains the samples.
+///
+/// Rung 1, least squares with the samples' noise for weights. N^0, N_c^0 are SolveLambertian's, f_kc
+/// = 1 / e_kc, and SampleNoise gives shot and read noise:
+///
+///     var_kc = f_kc (shot_c b_c max(N^0 . l_k, 0.02 |N^0|) + f_kc read_c^2)                   (1)
+///     b_c = max(0, N_c^0 . N^0 / |N^0|^2)                                                    (2)
+///     N = argmin sum_kc (i'_kc - b_c N . l_k)^2 / var_kc over usable samples k               (3)
+///     uncertainty = sqrt(tr C - n.C n) / |N|,  C = (sum_k W_k l_k l_k^T)^-1,
+///     W_k = sum_c b_c^2 / var_kc,  times s of the whole image                                (4)
+///     misfit = sum_k W_k (m_k - N . l_k)^2 / (usable - 3),  m_k the mean of i'_kc / b_c        (5)
+///
+/// Variances come from what least squares predict, not from the samples: weights taken from noisy
+/// samples would draw N towards the dark. `uncertainty` is the root mean square angle, in degrees,
+/// between n and the truth; 95 of 100 angles are below 1.96 times that (1.73 where it is the same in
+/// all directions). s^2 is the 25th percentile (5th where the noise is unknown) of the misfits over
+/// that of chi^2: at most 1 where the noise is known, because demosaicing only takes noise away; at
+/// most what neighbouring pixels differ by where it is not, because a shiny scene misfits everywhere.
+///
+/// Rung 2, consensus, where misfit / s^2 is above the (1 - false_alarms) quantile of chi^2 and the
+/// residual above explained_residual |N|. With the sum a_c of i'_kc over the usable samples and its
+/// departure from grey d_c = a_c - (a_r + a_g + a_b) / 3:
+///
+///     j_k = sum_c w_c i'_kc,  w_c = y d_c / |d|^2 where |d| > 0.2 |a|, y = luminance of a;
+///     else, and where (9) is not below a tenth of what it is without, j_k = i'_k               (6)
+///     band = j_k > 0.4 q, q = median of the usable j_k; beyond 10 samples without the darkest
+///     34 and brightest 50 of 100                                                             (7)
+///     N_abc . l_k = j_k for k = a, b, c:  every triple of the band (of 10 evenly spaced ranks)  (8)
+///     N = the N_abc of least prod_k (1 + |j_k - N_abc . l_k| / (0.03 q))                       (9)
+///     twice: N = argmin sum_k w_k (j_k - N . l_k)^2, w_k = (1 + (r_k / (0.1 q))^2)^-2          (10)
+///     uncertainty = hypot(3 degrees, 4 sqrt((tr C - n.C n) S) / |N|),
+///     C = (sum_k w_k l_k l_k^T)^-1, S = sum_k w_k r_k^2 / max(1, sum_k w_k - 3)               (11)
+///
+/// (6): the highlights of white lights on what is not metal are white, and a coloured cloth's
+/// departure from grey has no part in them.
+/// (9) is the sum of logarithms: it prefers a normal that many samples agree with exactly, whatever
+/// the others do, which is what highlights and shadows need. A pixel in which fewer than four
+/// samples agree with N to 0.1 q is kUnexplained; one with three usable samples, which nothing can
+/// check, is kUnchecked.
+///
+/// stack, rig, mask, errors   as SolveLambertian
+/// Cost     rung 1 about twice SolveLambertian; rung 2 O(K^2 + K 10^3) a pixel; no
+///          allocation a pixel; the same bits for any number of threads
+/// Source   the search over triples is exhaustive RANSAC (Fischler and Bolles 1981) with the cost of
+///          sparse regression (log-sum: Candes, Wakin and Boyd 2008); the band is position
+///          thresholding (Shi et al. 2014, section 3);
+///          (6) is the specular-free subspace of Mallick, Zickler, Kriegman and Belhumeur 2005
+[[nodiscard]] Result<NormalField> SolveLadder(const LightStack& stack, const Rig& rig,
+                                              const std::optional<Mask>& mask,
+                                              const LadderOptions& options = {},
+                                              const Task& task = {});
+
+// The same into a field that may hold an earlier result, as SolveLambertianInto.
+[[nodiscard]] Status SolveLadderInto(const LightStack& stack, const Rig& rig,
+                                     const std::optional<Mask>& mask, const LadderOptions& options,
+                                     const Task& task, NormalField& field);
+
+// The `share` quantile of chi^2 over its degrees of freedom, by Wilson and Hilferty's cube root:
+// within 1 % from 3 degrees of freedom up.
+[[nodiscard]] double ChiSquaredQuantile(double share, int freedom);
+
+}  // namespace sateen

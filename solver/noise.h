@@ -1,0 +1,37 @@
+#pragma once
+
+#include <array>
+#include <optional>
+#include <vector>
+
+#include "imaging/light_stack.h"
+#include "rig/rig.h"
+
+namespace sateen {
+
+// Noise of one frame's samples: of radiance i of channel c, variance = shot[c] i + read[c]^2.
+struct SampleNoise {
+  std::array<double, 3> shot = {1.0, 1.0, 1.0};
+  std::array<double, 3> read = {0.0, 0.0, 0.0};
+};
+
+// One for each frame of a stack.
+using StackNoise = std::vector<SampleNoise>;
+
+// Below this n . l the noise of a sample counts as what it is here: an unknown light has no read
+// noise, and without it a grazing sample would have all the weight.
+inline constexpr float kLeastCosine = 0.02F;
+
+/// From the response of the rig: with u_c = w_c full_scale / (max w (white - black)), the radiance
+/// of one DN of channel c and white balance w,
+///
+///     shot_c = gain u_c,   read_c = read_noise u_c                                        (1)
+///
+/// Nothing where the rig has no gain or read noise, or a frame no full scale. Demosaicing averages
+/// sites, so that pixels have less noise than this; the ladder measures by how much.
+[[nodiscard]] std::optional<StackNoise> NoiseOf(const LightStack& stack, const Rig& rig);
+
+// Shot noise of unknown gain: right but for one factor, which the ladder measures.
+[[nodiscard]] StackNoise UnknownNoise(size_t frames);
+
+}  // namespace sateen

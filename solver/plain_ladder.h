@@ -1,0 +1,35 @@
+#pragma once
+
+#include <Eigen/Core>
+
+#include "solver/lambertian.h"
+#include "solver/noise.h"
+#include "solver/pixel_system.h"
+
+namespace sateen {
+
+// The rungs of solver/ladder.h for one pixel, in double and as the equations stand there: what the
+// fast kernel is tested against, and what solves the pixels that it refuses.
+struct PlainAnswer {
+  Eigen::Vector3d n = Eigen::Vector3d::Zero();  // N, of luminance; zero: no answer
+  Eigen::Matrix3d n_rgb = Eigen::Matrix3d::Zero();
+  double residual = 0.0;
+  double uncertainty_deg = 0.0;
+  double misfit = 0.0;  // rung 1 alone
+  int agreeing = 0;     // rung 2 alone
+};
+
+// Equations (1) to (5), with s = 1, from N^0 of least squares.
+[[nodiscard]] PlainAnswer PlainWeighted(const PixelSystem& system, const StackNoise& noise);
+// Equations (6) to (11).
+[[nodiscard]] PlainAnswer PlainConsensus(const PixelSystem& system);
+
+// Marks the pixels of this reason in `misfit`, for WeighRowsInDouble to find.
+void MarkPending(Reason which, int row_begin, int row_end, const NormalField& field,
+                 Image<float>& misfit);
+// PlainWeighted for the marked pixels that are solved by now.
+void WeighRowsInDouble(const LightStack& stack, const Rig& rig, const LambertianOptions& options,
+                       const StackNoise& noise, int row_begin, int row_end, NormalField& field,
+                       Image<float>& misfit);
+
+}  // namespace sateen
