@@ -28,7 +28,7 @@ help:  ## This list
 setup:  ## Install the Debian packages that are missing (packages.txt)
 	@tools/setup
 
-demo: build  ## Render a small light stack, solve it, compare with the truth
+demo: build  ## Capture, calibrate and solve on the virtual rig, compare with the truth
 	@samples/demo.sh
 
 build: setup  ## Build everything into build/release

@@ -38,3 +38,4 @@ echo "-- the fabric lies on the table"
 on_rig twill-table sateen capture --rig rig.json -o scans/twill
 type_in sateen session verify scans/twill
 type_in sateen solve scans/twill --truth table/twill-table -o maps/twill
+type_in sateen session overview scans/twill --maps maps/twill -o contact-sheet.png

@@ -1,22 +1,18 @@
 #!/usr/bin/env bash
-# Solves a small session that comes with the project, then renders a whole light stack with known
-# answers, solves it, and compares the two.
-# Usage: samples/demo.sh [PROGRAM [OUTPUT_FOLDER]]
+# Solves a small session that comes with the project, then runs the whole loop without hardware:
+# captures white paper and a fabric on the virtual rig, calibrates, solves, and compares with the truth.
+# Usage: samples/demo.sh [FOLDER_OF_PROGRAMS [OUTPUT_FOLDER]]
 set -euo pipefail
 cd "$(dirname "$0")/.."
-sateen=${1:-build/release/bin/sateen}
+bin=${1:-build/release/bin}
 out=${2:-out/demo}
 
 echo "== Solve: eleven RAW frames of a denim twill, 160x120 pixels, that come with the project"
-"$sateen" solve samples/sessions/twill-small -o "$out/twill"
+"$bin/sateen" solve samples/sessions/twill-small -o "$out/twill"
 echo
-echo "== Simulate: crossed waves under ten LEDs 600 mm away, as a 14-bit camera sees them"
-"$sateen" simulate samples/scenes/ripple.json -o "$out/ripple/session"
-echo
-echo "== Solve: normal and albedo for every pixel, compared with the truth"
-"$sateen" solve "$out/ripple/session" -o "$out/ripple/maps"
-echo
+echo "== Capture, calibrate, solve: the LED board's own firmware in a simulated chip, a camera on PTP/IP"
+samples/capture.sh "$bin" "$out"
 echo "Look at:"
-echo "  $out/twill/overview.png           frame, normals, albedo, error (at the yarns' edges)"
-echo "  $out/ripple/session/overview.png  all frames, true normals, albedo, height"
-echo "  $out/ripple/maps/overview.png     frame, normals, albedo, error"
+echo "  $out/capture/contact-sheet.png       every frame that was captured, and the maps made of them"
+echo "  $out/capture/maps/twill/overview.png frame, normals, albedo, error from truth"
+echo "  $out/twill/overview.png              the same of the session that comes with the project"
