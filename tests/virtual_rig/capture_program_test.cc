@@ -1,0 +1,135 @@
+#include <gmock/gmock.h>
+
+#include <cstdlib>
+#include <string>
+
+#include "tests/testing/files.h"
+#include "tests/virtual_rig/running_rig.h"
+
+// Whole captures by the programs as people type them, on the virtual rig: real firmware, libserialport,
+// libgphoto2 and LibRaw. `capture_bench` does the same for every fault in every phase.
+namespace sateen::testing {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::HasSubstr;
+
+class CaptureProgram : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    scene_ = new TempFolder();
+    // The sample on a small sensor, so that the sanitizers get through in time.
+    json rig = json::parse(std::ifstream(SATEEN_SOURCE_DIR "/samples/rigs/ring10.json"));
+    rig["camera"]["size_px"] = {160, 120};
+    rig["camera"]["k"] = {488.0, 488.0, 79.5, 59.5};
+    rig["calibration"]["lights"] = json::object();
+    WriteText(scene_->Path() / "rig.json", rig.dump());
+    json scene = json::parse(std::ifstream(SATEEN_SOURCE_DIR "/samples/scenes/twill-table.json"));
+    scene["rig"] = "rig.json";
+    WriteText(scene_->Path() / "scene.json", scene.dump());
+    const ShellResult rendered =
+        Shell(kSateen + " simulate " + (scene_->Path() / "scene.json").string() + " --linear -o " +
+              (scene_->Path() / "table").string());
+    ASSERT_EQ(rendered.exit_status, 0) << rendered.out;
+  }
+  static void TearDownTestSuite() {
+    delete scene_;
+    scene_ = nullptr;
+  }
+
+  CaptureProgram() { setenv("HOME", folder_.Path().c_str(), 1); }
+
+  // `command` of sateen under the rig.
+  ShellResult OnRig(const std::string& rig_options, const std::string& command) {
+    return Shell(kRig + " run --scene " + (scene_->Path() / "table").string() + " --events " +
+                 events_.string() + " " + rig_options + " -- " + command);
+  }
+  [[nodiscard]] std::string Capture(const std::string& options) const {
+    return kSateen + " capture --rig " + (scene_->Path() / "rig.json").string() + " -o " +
+           session_.string() + " --margin 9s " + options;
+  }
+  [[nodiscard]] std::string Resume() const {
+    return kSateen + " capture --resume " + session_.string() + " --margin 9s";
+  }
+  void ExpectWhole() {
+    const ShellResult verified = Shell(kSateen + " session verify " + session_.string());
+    EXPECT_EQ(verified.exit_status, 0) << verified.out;
+  }
+  // By the pins, when the rig ended.
+  void ExpectAllLightsOff() {
+    std::map<int, double> level;
+    for (const json& event : Events(events_)) {
+      if (event["event"] == "light") {
+        level[event["channel"]] = event["level"];
+      }
+    }
+    for (const auto& [channel, last] : level) {
+      EXPECT_EQ(last, 0.0) << channel;
+    }
+  }
+
+  static inline TempFolder* scene_ = nullptr;
+  const TempFolder folder_;
+  const fs::path session_ = folder_.Path() / "twill";
+  const fs::path events_ = folder_.Path() / "events.jsonl";
+};
+
+TEST_F(CaptureProgram, FindsTheExposureAndTakesEveryFrame) {
+  const ShellResult captured = OnRig("", Capture("--json 2>/dev/null"));
+  ASSERT_EQ(captured.exit_status, 0) << captured.out;
+  const json report = json::parse(captured.out);
+  EXPECT_EQ(report["taken"], 13);
+  EXPECT_EQ(report["rejected"], 0);
+  ExpectAllLightsOff();
+  ExpectWhole();
+  const ShellResult solved = Shell(kSateen + " solve " + session_.string() + " --truth " +
+                                   (scene_->Path() / "table").string() + " --json -o " +
+                                   (folder_.Path() / "maps").string() + " 2>/dev/null");
+  ASSERT_EQ(solved.exit_status, 0) << solved.out;
+  EXPECT_LT(json::parse(solved.out)["angular_error_deg"]["median"], 1.0);
+}
+
+TEST_F(CaptureProgram, GoesOnAfterItWasKilled) {
+  // With the first event of the third frame's light the program is killed, which says nothing more.
+  const ShellResult killed = OnRig("", "sh -c 'exec 3>&1; " + Capture("--exposure 1/50") +
+                                           " & while ! grep -q \"led-1\" " + events_.string() +
+                                           "; do sleep 0.01; done; kill -9 $!; sleep 2.5'");
+  EXPECT_EQ(killed.exit_status, 0) << killed.out;
+  ExpectAllLightsOff();  // by the board itself
+  EXPECT_FALSE(fs::exists(session_ / "session.json"));
+  const ShellResult resumed = OnRig("", Resume());
+  ASSERT_EQ(resumed.exit_status, 0) << resumed.out;
+  EXPECT_THAT(resumed.out, HasSubstr("kept from before"));
+  ExpectWhole();
+}
+
+TEST_F(CaptureProgram, APulledCableCostsAFrameAtMost) {
+  const ShellResult captured = OnRig("--at 5:unplug --at 5+300ms:plug", Capture("--exposure 1/50"));
+  ASSERT_EQ(captured.exit_status, 0) << captured.out;
+  EXPECT_THAT(captured.out, HasSubstr("rejected and taken again"));
+  ExpectAllLightsOff();
+  ExpectWhole();
+}
+
+TEST_F(CaptureProgram, AFaultOfTheCameraCostsAFrameAtMost) {
+  const ShellResult captured =
+      OnRig("--at '4:camera dropped-mid-file' --at '9:camera truncated-file'",
+            Capture("--exposure 1/50"));
+  ASSERT_EQ(captured.exit_status, 0) << captured.out;
+  ExpectAllLightsOff();
+  ExpectWhole();
+}
+
+TEST_F(CaptureProgram, NamesTheLightsThatWereSwapped) {
+  const ShellResult captured = OnRig("--fault 'swap led-2 led-7'", Capture("--exposure 1/50"));
+  EXPECT_EQ(captured.exit_status, 3) << captured.out;
+  EXPECT_THAT(captured.out, HasSubstr("'led-2'"));
+  EXPECT_THAT(captured.out, HasSubstr("'led-7'"));
+  ExpectAllLightsOff();
+  const ShellResult mended = OnRig("", Resume());
+  EXPECT_EQ(mended.exit_status, 0) << mended.out;
+  ExpectWhole();
+}
+
+}  // namespace
+}  // namespace sateen::testing
