@@ -221,6 +221,7 @@ class CalibrateBench {
       SolveArgs args{.capture = Path(kFabric),
                      .output = Path("maps"),
                      .rig_file = Path(rig),
+                     .robust = "none",  // what the lights do, not what an estimator makes of it
                      .threads = args_.threads,
                      .json = true};
       const Result<json> done = Command(RunSolve, args);

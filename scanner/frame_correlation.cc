@@ -22,7 +22,7 @@ float MeanOfFinite(const Image<float>& image) {
 }
 
 // Texture alone, fading out towards the border, which wraps around.
-cv::Mat HighPassed(const Image<float>& image) {
+cv::Mat TextureOf(const Image<float>& image) {
   cv::Mat values(image.height, image.width, CV_32F);
   const float mean = MeanOfFinite(image);
   std::ranges::transform(image.pixels, values.begin<float>(),
@@ -49,8 +49,8 @@ Correlation ShiftBetween(const Image<float>& first, const Image<float>& second) 
   if (first.Size() != second.Size() || std::min(first.width, first.height) < kFewestCells) {
     return {};
   }
-  const cv::Mat f = HighPassed(first);
-  const cv::Mat g = HighPassed(second);
+  const cv::Mat f = TextureOf(first);
+  const cv::Mat g = TextureOf(second);
   const double scale = cv::norm(f) * cv::norm(g);
   if (scale == 0.0) {
     return {};

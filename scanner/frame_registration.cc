@@ -5,7 +5,7 @@
 #include <cmath>
 #include <utility>
 
-#include "scanner/frame_shift.h"
+#include "scanner/registration_images.h"
 
 namespace sateen {
 namespace {
@@ -23,90 +23,6 @@ constexpr Eigen::Index kUnknowns = 5;  // of a frame: dx, dy, and a
 
 using Matrix = Eigen::MatrixXd;
 using Vector = Eigen::VectorXd;
-
-Image<float> Halved(const Image<float>& image) {
-  Image<float> half(image.width / 2, image.height / 2);
-  for (int y = 0; y < half.height; ++y) {
-    for (int x = 0; x < half.width; ++x) {
-      half.At(x, y) = 0.25F * (image.At(2 * x, 2 * y) + image.At(2 * x + 1, 2 * y) +
-                               image.At(2 * x, 2 * y + 1) + image.At(2 * x + 1, 2 * y + 1));
-    }
-  }
-  return half;
-}
-
-// Less the mean of the finite ones among (2 kBlurCells + 1)^2 cells around each.
-Image<float> HighPassed(const Image<float>& image) {
-  constexpr int kBlurCells = 4;
-  const int width = image.width;
-  // Sums and counts of all above and left of a place.
-  std::vector<double> sums(static_cast<size_t>(width + 1) * static_cast<size_t>(image.height + 1));
-  std::vector<int> counts(sums.size());
-  const auto at = [&](int x, int y) {
-    return static_cast<size_t>(y) * static_cast<size_t>(width + 1) + static_cast<size_t>(x);
-  };
-  for (int y = 0; y < image.height; ++y) {
-    for (int x = 0; x < width; ++x) {
-      const float value = image.At(x, y);
-      const bool is_known = std::isfinite(value);
-      sums[at(x + 1, y + 1)] = sums[at(x, y + 1)] + sums[at(x + 1, y)] - sums[at(x, y)] +
-                               (is_known ? static_cast<double>(value) : 0.0);
-      counts[at(x + 1, y + 1)] =
-          counts[at(x, y + 1)] + counts[at(x + 1, y)] - counts[at(x, y)] + (is_known ? 1 : 0);
-    }
-  }
-  Image<float> high = image;
-  for (int y = 0; y < image.height; ++y) {
-    const int y0 = std::max(0, y - kBlurCells);
-    const int y1 = std::min(image.height, y + kBlurCells + 1);
-    for (int x = 0; x < width; ++x) {
-      const int x0 = std::max(0, x - kBlurCells);
-      const int x1 = std::min(width, x + kBlurCells + 1);
-      const auto over = [&](const auto& table) {
-        return table[at(x1, y1)] - table[at(x0, y1)] - table[at(x1, y0)] + table[at(x0, y0)];
-      };
-      high.At(x, y) -= static_cast<float>(over(sums) / std::max(over(counts), 1));
-    }
-  }
-  return high;
-}
-
-// image(x + shift); not finite beyond the picture. A cubic of four samples would do for the eye, but
-// moves a texture of 4 cells by a fifth less than it says.
-Image<float> Moved(const Image<float>& image, const Eigen::Vector2d& shift) {
-  if (shift.isZero()) {
-    return image;
-  }
-  const LanczosWindow along_x = LanczosAt(shift.x());
-  const LanczosWindow along_y = LanczosAt(shift.y());
-  const auto taps = static_cast<int>(along_x.weights.size());
-  Image<float> rows(image.width, image.height, std::numeric_limits<float>::quiet_NaN());
-  const int right = std::min(image.width, image.width - along_x.first - taps + 1);
-  for (int y = 0; y < image.height; ++y) {
-    for (int x = std::max(0, -along_x.first); x < right; ++x) {
-      const float* at = &image.At(x + along_x.first, y);
-      float sum = 0.0F;
-      for (size_t m = 0; m < along_x.weights.size(); ++m) {
-        sum += along_x.weights[m] * at[m];
-      }
-      rows.At(x, y) = sum;
-    }
-  }
-  Image<float> moved(image.width, image.height, std::numeric_limits<float>::quiet_NaN());
-  const auto width = static_cast<size_t>(image.width);
-  const int bottom = std::min(image.height, image.height - along_y.first - taps + 1);
-  for (int y = std::max(0, -along_y.first); y < bottom; ++y) {
-    const float* above = &rows.At(0, y + along_y.first);
-    for (size_t x = 0; x < width; ++x) {
-      float sum = 0.0F;
-      for (size_t m = 0; m < along_y.weights.size(); ++m) {
-        sum += along_y.weights[m] * above[x + m * width];
-      }
-      moved.At(static_cast<int>(x), y) = sum;
-    }
-  }
-  return moved;
-}
 
 // Of the parabola of fourth order: a difference of two neighbours would be a third too small for a
 // texture of 4 cells, and the steps that much too large.
@@ -155,13 +71,23 @@ class Level {
     Move(shifts);
     double sum = 0.0;
     double cells = 0.0;
+    double all = 0.0;
+    double left = 0.0;
     for (const Tile& tile : tiles_) {
       Gather(tile, /*with_gradients=*/false);
       sum += r_.sum();
       cells += static_cast<double>(r_.size());
+      all += v_.squaredNorm();
+      left += misfit2_.sum();
     }
+    const auto frames = static_cast<double>(count_);
+    explained_ = all > 0.0 ? 1.0 - left / (frames - 3.0) / (all / frames) : 0.0;
     return cells > 0.0 ? sum / cells : std::numeric_limits<double>::infinity();
   }
+
+  // The share of the frames' variance that a surface explains, at the shifts of the last Misfit(): 0
+  // where there is only noise.
+  [[nodiscard]] double Explained() const { return explained_; }
 
   // One step of Gauss-Newton from `shifts`; returns the longest, in cells.
   double Step(std::vector<Eigen::Vector2d>& shifts, std::vector<double>& sd) {
@@ -343,6 +269,7 @@ class Level {
   std::vector<Tile> tiles_;
   std::vector<Image<float>> moved_;
   double scale_ = 1.0;  // s of (3)
+  double explained_ = 0.0;
   // Of the tile that was gathered last, one row a cell.
   Matrix v_;
   Matrix regressors_;  // -d/dx of each frame, -d/dy of each, N'
@@ -395,6 +322,7 @@ class Registration {
     const double misfit = levels_[0].Misfit(shifts);
     if (best_.empty() || misfit < misfit_) {
       misfit_ = misfit;
+      explained_ = levels_[0].Explained();
       best_ = std::move(shifts);
       best_sd_ = sd_;
     }
@@ -416,6 +344,8 @@ class Registration {
     return best;
   }
 
+  [[nodiscard]] double Explained() const { return explained_; }
+
   [[nodiscard]] std::vector<Shift> Shifts() const {
     std::vector<Shift> shifts(best_.size(), Shift{.sd_px = 0.0});
     for (size_t k = 1; k < best_.size(); ++k) {
@@ -430,6 +360,7 @@ class Registration {
   std::vector<Eigen::Vector2d> best_;
   std::vector<double> best_sd_;
   double misfit_ = 0.0;
+  double explained_ = 0.0;
 };
 
 // (4); l and d relative to the first frame's.
@@ -487,6 +418,9 @@ std::vector<Shift> RegisterFrames(const FramesToRegister& input, double min_peak
                       std::vector<Eigen::Vector2d>(input.frames.size(), Eigen::Vector2d::Zero()));
   if (last.px.norm() > kFarPx) {
     registration.Refine(1, registration.BestStart(last.px / kPxOfCell));
+  }
+  if (registration.Explained() < min_peak) {
+    return nothing;  // first and last frame have the same noise, and nothing else in common
   }
   std::vector<Shift> shifts = registration.Shifts();
   const Image<float>& first = *input.frames.front();

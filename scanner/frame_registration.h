@@ -54,8 +54,9 @@ struct FramesToRegister {
 ///     d_k -= B (l_k - l_1),   min over B of sum_k |(d_k - d_k-1) - B (l_k - l_k-1)|,  l in x, y (4)
 ///
 /// Returns  one for each frame; the first is zero. sd_px is infinite where nothing can be told: first
-///          and last frame correlate by less than `min_peak`, so that there is more noise than
-///          texture; fewer than 5 frames; fewer than 32 x 32 cells; lights in one plane
+///          and last frame correlate by less than `min_peak`, or less than that share of the frames'
+///          variance is a surface's, so that there is more noise than texture; fewer than 5 frames;
+///          fewer than 32 x 32 cells; lights in one plane
 /// Cost     about 26 ms a frame of 512 x 512 cells on one thread, 140 ms where they have moved by
 ///          pixels; the same bits every time
 /// Source   four and more lights are linearly dependent whatever the surface: Barsky and Petrou, "The

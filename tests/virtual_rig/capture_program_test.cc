@@ -68,6 +68,16 @@ class CaptureProgram : public ::testing::Test {
     }
   }
 
+  // Of the normals of plain least squares. [deg]
+  double MedianErrorOf(const fs::path& session) {
+    const ShellResult solved =
+        Shell(kSateen + " solve " + session.string() + " --robust none --json --truth " +
+              (scene_->Path() / "table").string() + " -o " + (folder_.Path() / "maps").string() +
+              " 2>/dev/null");
+    EXPECT_EQ(solved.exit_status, 0) << solved.out;
+    return json::parse(solved.out)["angular_error_deg"]["median"];
+  }
+
   static inline TempFolder* scene_ = nullptr;
   const TempFolder folder_;
   const fs::path session_ = folder_.Path() / "twill";
@@ -82,11 +92,10 @@ TEST_F(CaptureProgram, FindsTheExposureAndTakesEveryFrame) {
   EXPECT_EQ(report["rejected"], 0);
   ExpectAllLightsOff();
   ExpectWhole();
-  const ShellResult solved = Shell(kSateen + " solve " + session_.string() + " --truth " +
-                                   (scene_->Path() / "table").string() + " --json -o " +
-                                   (folder_.Path() / "maps").string() + " 2>/dev/null");
-  ASSERT_EQ(solved.exit_status, 0) << solved.out;
-  EXPECT_LT(json::parse(solved.out)["angular_error_deg"]["median"], 1.0);
+  // On so few pixels a twill is not solved well; the capture must not add to that.
+  const double captured_deg = MedianErrorOf(session_);
+  const double ideal_deg = MedianErrorOf(scene_->Path() / "table");
+  EXPECT_NEAR(captured_deg, ideal_deg, 0.1 * ideal_deg);
 }
 
 TEST_F(CaptureProgram, GoesOnAfterItWasKilled) {

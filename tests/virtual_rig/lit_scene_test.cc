@@ -49,7 +49,7 @@ TEST_F(LitSceneTest, RefusesWhatIsNoSceneOfLinearFrames) {
   WriteSmallScene(Dir(), 0.0, [](Session& s, Rig&) { s.frames.pop_back(); });
   EXPECT_THAT(Refusal(), HasSubstr("has no dark frame; render it with sateen simulate SCENE"));
   WriteSmallScene(Dir(), 0.0, [](Session& s, Rig&) { s.frames.erase(s.frames.begin() + 4); });
-  EXPECT_THAT(Refusal(), HasSubstr("has no frame of light 'led-4'"));
+  EXPECT_THAT(Refusal(), HasSubstr("has 0 frames of light 'led-4'"));
   WriteSmallScene(Dir(), 0.0, [](Session& s, Rig&) {
     for (SessionFrame& frame : s.frames) {
       frame.exposure_s = 0.02;
