@@ -9,11 +9,11 @@
 
 #include "cli/calibrate_lights.h"
 #include "cli/peak_memory.h"
-#include "core/scratch_folder.h"
 #include "cli/simulate.h"
 #include "cli/solve.h"
 #include "core/output_folder.h"
 #include "core/parallel.h"
+#include "core/scratch_folder.h"
 #include "imaging/raw.h"
 #include "simulation/rigs.h"
 

@@ -8,9 +8,9 @@
 #include <utility>
 
 #include "cli/bench_simulate_report.h"
+#include "cli/peak_memory.h"
 #include "cli/pictures.h"
 #include "cli/scene_switches.h"
-#include "cli/peak_memory.h"
 #include "core/scratch_folder.h"
 #include "imaging/dng.h"
 #include "imaging/image_io.h"

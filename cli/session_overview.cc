@@ -103,7 +103,8 @@ Result<std::vector<Rgb8>> MapPanels(const fs::path& maps) {
         return add("albedo.exr", "albedo", [](const Image3& map) { return ShowLinear(map); });
       });
   for (const auto& [file, caption] :
-       {std::pair{"residual.exr", "residual"}, std::pair{"error.exr", "error from truth"}}) {
+       {std::pair{"residual.exr", "residual"}, std::pair{"uncertainty.exr", "uncertainty"},
+        std::pair{"error.exr", "error from truth"}}) {
     std::error_code ignored;
     if (status && fs::exists(maps / file, ignored)) {
       status = ReadPhoto(maps / file).map([&, caption = caption](const Photo& map) {
@@ -125,7 +126,7 @@ Status WriteOverview(const SessionOverviewArgs& args, const Task& task) {
     while (panels->size() % kColumns != 0) {
       Rgb8 empty = panels->back();
       for (Image<uint8_t>& plane : empty) {
-        std::ranges::fill(plane.pixels, uint8_t{0});
+        std::ranges::fill(plane.pixels, uint8_t{255});
       }
       panels->push_back(std::move(empty));
     }
