@@ -28,7 +28,10 @@ using sateen::Result;
 const std::string kRigProgram = SATEEN_PROGRAM_DIR "/sateen-virtual-rig";
 const std::string kSateen = SATEEN_PROGRAM_DIR "/sateen";
 
+bool all_met = true;
+
 void Row(const std::string& what, const std::string& measured, const std::string& bar, bool met) {
+  all_met = all_met && met;
   fmt::print("{:<46} {:<60} {:<22} {}\n", what, measured, bar, met ? "met" : "NOT MET");
   std::fflush(stdout);
 }
@@ -158,10 +161,10 @@ void MeasureSpeed(CaptureBench& bench, const fs::path& source, int sessions) {
   Row("session of 13 frames, 16 megapixels",
       fmt::format("{:.1f} s, best of {} {:.1f} s", seconds[seconds.size() / 2], sessions,
                   seconds[0]),
-      "12 s", seconds[0] <= 12.0);
+      "12 s", seconds[seconds.size() / 2] <= 12.0);
   Row("all but exposing and delivering, a frame",
       fmt::format("{:.0f} ms, decoding and the last checks with it", overhead_ms[sessions / 2]),
-      "100 ms", overhead_ms[0] <= 100.0);
+      "100 ms", overhead_ms[overhead_ms.size() / 2] <= 100.0);
 }
 
 // kill -9 at moments spread over a capture, then --resume.
@@ -196,7 +199,7 @@ void MeasureKills(CaptureBench& bench, int kills) {
   bench.Remove("whole");
   Row(fmt::format("kill -9 at {} moments", kills),
       fmt::format("{} killed, {} resumed and verified, {} the same", killed, completed, same),
-      "all", completed == kills && same == kills);
+      "all", killed == kills && completed == kills && same == kills);
   Row("a light after kill -9", fmt::format("on for {:.2f} s at most", longest_lit), "2.1 s",
       longest_lit <= 2.1);
 }
@@ -390,5 +393,5 @@ int main(int argc, char** argv) {
   if (wanted("speed")) {
     MeasureSpeed(bench, source, full ? 5 : 1);
   }
-  return 0;
+  return all_met ? 0 : 3;
 }

@@ -15,7 +15,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kIncoming = "incoming";
 constexpr double kFabricPeak = 0.8;  // of what saturates
 constexpr double kSheetPeak = 0.6;   // its readings must be proportional to 0.2 %
 constexpr int kMostTests = 8;        // frames to find an exposure by
@@ -101,8 +100,8 @@ Status CaptureSession::MakePlan(Tools& tools) {
   return writer_.Planned(plan, reason).map([&] {
     journal_.plan = std::move(plan);
     journal_.done.assign(journal_.plan.size(), std::nullopt);
-    looks_.clear();
-    looks_.resize(journal_.plan.size());
+    looks_.assign(journal_.plan.size(), std::nullopt);
+    is_new_.assign(journal_.plan.size(), false);
   });
 }
 
@@ -137,13 +136,16 @@ Result<std::vector<double>> CaptureSession::Meter(std::size_t light, Tools& tool
       return tl::unexpected(connected.error());
     }
   }
+  double longest_s = LongestExposure(tools.board.Info(), lit, options_);
+  for (const Light& other : rig_.lights) {
+    longest_s = std::min(longest_s, LongestExposure(tools.board.Info(), other, options_));
+  }
   const bool is_sheet = journal_.begun.kind == SessionKind::kSheet;
-  Result<ExposureSearch> search =
-      ExposureSearch::Begin(tools.camera.ExposureTimes(),
-                            {.peak = is_sheet ? kSheetPeak : kFabricPeak,
-                             .low = DarkestUseful(rig_.response),
-                             .most = is_sheet ? 1 : journal_.begun.brackets,
-                             .longest_s = LongestExposure(tools.board.Info(), lit, options_)});
+  Result<ExposureSearch> search = ExposureSearch::Begin(
+      tools.camera.ExposureTimes(), {.peak = is_sheet ? kSheetPeak : kFabricPeak,
+                                     .low = DarkestUseful(rig_.response),
+                                     .most = is_sheet ? 1 : journal_.begun.brackets,
+                                     .longest_s = longest_s});
   for (int test = 1; search && !search->Found(); ++test) {
     Tell(tools, "metering", lit.name, search->TestTime());
     const Result<SignalLevels> levels = TakeTestFrame(lit, search->TestTime(), tools);
@@ -186,7 +188,7 @@ Result<CaptureSession::Arrived> CaptureSession::Shoot(std::size_t frame, int att
   arrived.record.iso = set->iso;
   arrived.record.file = FileNameOf(frame, planned, path);
   FrameCheckOptions checks = options_.checks;
-  if (!IsBase(frame) || !journal_.begun.exposure_s) {
+  if (planned.role != FrameRole::kDark && (!IsBase(frame) || !journal_.begun.exposure_s)) {
     checks.max_saturated = 1.0;  // the shorter exposure has it, or another one is found
   }
   arrived.look = std::async(
@@ -222,8 +224,8 @@ Status CaptureSession::Settle(Arrived arrived, Tools& tools) {
   if (!journal_.begun.exposure_s && IsBase(frame) && LightOf(frame) != nullptr &&
       look->levels.saturated > options_.checks.max_saturated) {
     brighter_ = static_cast<std::size_t>(LightOf(frame) - rig_.lights.data());
-    return writer_.FrameRejected(
-        frame, fmt::format("light '{}' is brighter than the exposure allows", NameOf(frame)));
+    return Reject(frame,
+                  fmt::format("light '{}' is brighter than the exposure allows", NameOf(frame)));
   }
   arrived.record.sha256 = look->means.sha256;
   Status placed = Place(arrived, arrived.record).and_then([&] {
@@ -232,7 +234,8 @@ Status CaptureSession::Settle(Arrived arrived, Tools& tools) {
   if (placed) {
     looks_[frame] = *std::move(look);
     journal_.done[frame] = std::move(arrived.record);
-    ++taken_;
+    is_new_[frame] = true;
+    ++settled_;
     Tell(tools, "capturing", "", 0.0);
   }
   return placed;

@@ -14,15 +14,16 @@ Status CaptureOptions::Validate() const {
     return Fail(ErrorCode::kInvalidArgument, "exposure_s is {}; need more than 0 and at most 60",
                 *exposure_s);
   }
-  if (!(f_number > 0.0 && iso > 0.0)) {
-    return Fail(ErrorCode::kInvalidArgument, "f_number is {} and iso {}; need more than 0",
-                f_number, iso);
+  if (!(f_number > 0.0 && f_number <= 1000.0 && iso > 0.0 && iso <= 1e7)) {
+    return Fail(ErrorCode::kInvalidArgument,
+                "f_number is {} and iso {}; need more than 0, and at most 1000 and 1e7", f_number,
+                iso);
   }
   if (brackets < 1 || brackets > 3) {
     return Fail(ErrorCode::kInvalidArgument, "brackets is {}; need 1 to 3", brackets);
   }
-  if (!in(settle, milliseconds(0), milliseconds(10'000))) {
-    return Fail(ErrorCode::kInvalidArgument, "settle is {} ms; need 0 to 10000", settle.count());
+  if (!in(settle, milliseconds(0), milliseconds(1500))) {
+    return Fail(ErrorCode::kInvalidArgument, "settle is {} ms; need 0 to 1500", settle.count());
   }
   if (!in(margin, milliseconds(1), milliseconds(60'000))) {
     return Fail(ErrorCode::kInvalidArgument, "margin is {} ms; need 1 to 60000", margin.count());

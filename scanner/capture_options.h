@@ -21,7 +21,7 @@ struct CaptureOptions {
   int brackets = 3;
   // Of each light, (0, 1].
   double level = 1.0;
-  // From a light's going on to the exposure; 0 ms to 10 s.
+  // From a light's going on to the exposure; 0 to 1.5 s: then the board must hear something.
   std::chrono::milliseconds settle{30};
   // How much longer than the exposure a light may stay on: until the camera has delivered. 1 ms to
   // 60 s; no longer than the board allows a light.

@@ -42,8 +42,9 @@ Status CheckRoom(const Rig& rig, std::size_t frames, const fs::path& dir) {
   return {};
 }
 
-// Each light of the rig is one that the board can switch, at that level.
-Status CheckChannels(const Rig& rig, const LightBoard& board, double level) {
+// Each light of the rig is one that the board can switch, at that level and for that long.
+Status CheckChannels(const Rig& rig, const LightBoard& board, double level,
+                     const CaptureOptions& options) {
   const std::vector<LightLimits>& limits = board.Info().lights;
   for (const Light& light : rig.lights) {
     if (light.channel < 0 || static_cast<std::size_t>(light.channel) >= limits.size()) {
@@ -59,6 +60,15 @@ Status CheckChannels(const Rig& rig, const LightBoard& board, double level) {
                   "use --level {:.4g}%, or raise the limit: sateen light limits {}",
                   100.0 * level, 100.0 * most, light.name, 100.0 * most, light.channel);
     }
+    const std::chrono::duration<double> on =
+        limits[static_cast<std::size_t>(light.channel)].max_on - options.settle;
+    if (options.exposure_s.value_or(0.0) >= on.count()) {
+      return Fail(ErrorCode::kInvalidArgument,
+                  "an exposure of {:.4g} s is longer than the board lets light '{}' be on, {:.4g} "
+                  "s; expose shorter, or raise the limit if the LED bears it: sateen light limits "
+                  "{} --max-on TIME",
+                  *options.exposure_s, light.name, on.count(), light.channel);
+    }
   }
   return {};
 }
@@ -68,14 +78,22 @@ struct OpenDevices {
   TetheredCamera* camera;
 };
 
-Result<OpenDevices> OpenFor(const Rig& rig, double level, RigDevices& devices) {
+Result<OpenDevices> OpenFor(const Rig& rig, double level, const CaptureOptions& options,
+                            RigDevices& devices) {
   const Result<LightBoard*> board = devices.Board();
   const Status channels =
-      board ? CheckChannels(rig, **board, level) : tl::unexpected(board.error());
+      board ? CheckChannels(rig, **board, level, options) : tl::unexpected(board.error());
   if (!channels) {
     return tl::unexpected(channels.error());
   }
   return devices.Camera().map([&](TetheredCamera* camera) { return OpenDevices{*board, camera}; });
+}
+
+// With what the journal says on resuming.
+CaptureOptions OptionsOf(const CaptureSession& session, const CaptureRequest& request) {
+  CaptureOptions options = request.options;
+  options.exposure_s = session.Record().begun.exposure_s;
+  return options;
 }
 
 Result<CaptureSession> BeginOrResume(const CaptureRequest& request) {
@@ -85,11 +103,10 @@ Result<CaptureSession> BeginOrResume(const CaptureRequest& request) {
 
 // Before a folder is made that a capture without devices would leave behind.
 Result<OpenDevices> OpenBefore(const CaptureRequest& request, RigDevices& devices) {
-  return request.options.Validate()
-      .and_then([&] { return ReadRig(request.rig); })
+  return CaptureSession::CheckBegin(request.output, request.rig, request.options)
       .and_then([&](const Rig& rig) {
         return CheckRoom(rig, PlanOf(rig, {1.0}).size(), request.output).and_then([&] {
-          return OpenFor(rig, request.options.level, devices);
+          return OpenFor(rig, request.options.level, request.options, devices);
         });
       });
 }
@@ -110,8 +127,8 @@ Result<CaptureSummary> RunCapture(const CaptureRequest& request, RigDevices& dev
   if (session->Record().complete) {
     return session->Finish();
   }
-  const Result<OpenDevices> open =
-      OpenFor(session->GetRig(), session->Record().begun.level, devices);
+  const Result<OpenDevices> open = OpenFor(session->GetRig(), session->Record().begun.level,
+                                           OptionsOf(*session, request), devices);
   if (!open) {
     return tl::unexpected(open.error());
   }
@@ -123,7 +140,7 @@ Result<CaptureSummary> RunCapture(const CaptureRequest& request, RigDevices& dev
 }
 
 Result<CaptureForecast> ForecastCapture(const CaptureRequest& request, RigDevices& devices) {
-  const Result<Rig> rig = request.options.Validate().and_then([&] { return ReadRig(request.rig); });
+  const Result<Rig> rig = CaptureSession::CheckBegin(request.output, request.rig, request.options);
   if (!rig) {
     return tl::unexpected(rig.error());
   }

@@ -64,7 +64,8 @@ bool HasFrames(const fs::path& dir) {
 bool IsPlanOf(const Rig& rig, const FramePlan& plan) {
   std::vector<double> exposures_s;
   for (const SessionFrame& frame : plan) {
-    if (frame.role == FrameRole::kLit && frame.light == rig.lights.front().name) {
+    if (frame.role == FrameRole::kLit && !rig.lights.empty() &&
+        frame.light == rig.lights.front().name) {
       exposures_s.push_back(*frame.exposure_s);
     }
   }
@@ -77,6 +78,7 @@ bool IsPlanOf(const Rig& rig, const FramePlan& plan) {
 }  // namespace
 
 FramePlan PlanOf(const Rig& rig, const std::vector<double>& exposures_s) {
+  SATEEN_CHECK(!rig.lights.empty() && !exposures_s.empty());
   const SessionFrame dark = {.role = FrameRole::kDark, .exposure_s = exposures_s.back()};
   FramePlan plan = {dark};
   for (const Light& light : rig.lights) {
@@ -108,16 +110,12 @@ CaptureSession::CaptureSession(fs::path dir, Rig rig, Journal journal, JournalWr
       journal_(std::move(journal)),
       writer_(std::move(writer)),
       options_(options),
-      looks_(journal_.done.size()) {}
+      looks_(journal_.done.size()),
+      is_new_(journal_.done.size()) {}
 
-Result<CaptureSession> CaptureSession::Begin(const fs::path& dir, const fs::path& rig_file,
-                                             const CaptureOptions& options) {
-  const Result<std::string> rig_text =
-      options.Validate().and_then([&] { return ReadFileBytes(rig_file); });
-  if (!rig_text) {
-    return tl::unexpected(rig_text.error());
-  }
-  Result<Rig> rig = ReadRig(rig_file);
+Result<Rig> CaptureSession::CheckBegin(const fs::path& dir, const fs::path& rig_file,
+                                       const CaptureOptions& options) {
+  Result<Rig> rig = options.Validate().and_then([&] { return ReadRig(rig_file); });
   Status status = rig ? CheckLights(*rig, rig_file) : tl::unexpected(rig.error());
   if (status && (Exists(dir / kRecordFile) || HasFrames(dir))) {
     status =
@@ -125,15 +123,29 @@ Result<CaptureSession> CaptureSession::Begin(const fs::path& dir, const fs::path
              "{}: holds a session already; choose another folder, or go on with it: --resume {}",
              dir.string(), dir.string());
   }
-  status = status.and_then([&] { return MakeFolder(dir / "frames"); }).and_then([&] {
-    return WriteFileWhole(dir / kRigFile, *rig_text);
-  });
-  if (!status) {
-    return tl::unexpected(status.error());
+  return status ? std::move(rig) : tl::unexpected(status.error());
+}
+
+Result<CaptureSession> CaptureSession::Begin(const fs::path& dir, const fs::path& rig_file,
+                                             const CaptureOptions& options) {
+  Result<Rig> rig = CheckBegin(dir, rig_file, options);
+  const Result<std::string> rig_text = rig ? ReadFileBytes(rig_file) : tl::unexpected(rig.error());
+  const Status made = rig_text ? MakeFolder(dir / "frames") : tl::unexpected(rig_text.error());
+  if (!made) {
+    return tl::unexpected(made.error());
   }
-  Result<JournalWriter> writer = JournalWriter::Open(dir, 0);
+  const fs::path parent = fs::absolute(dir).lexically_normal().parent_path();
+  Result<JournalWriter> writer =
+      FlushToDisk(parent, parent).and_then([&] { return JournalWriter::Open(dir); });
   if (!writer) {
     return tl::unexpected(writer.error());
+  }
+  // Again, now that no other program can begin here; then what was there goes.
+  const Status ready = CheckBegin(dir, rig_file, options)
+                           .and_then([&](const Rig&) { return writer->Keep(0); })
+                           .and_then([&] { return WriteFileWhole(dir / kRigFile, *rig_text); });
+  if (!ready) {
+    return tl::unexpected(ready.error());
   }
   const Journal journal{.begun = {.kind = options.kind,
                                   .rig = kRigFile,
@@ -153,7 +165,12 @@ Result<CaptureSession> CaptureSession::Resume(const fs::path& dir, const Capture
   if (const Status valid = options.Validate(); !valid) {
     return tl::unexpected(valid.error());
   }
-  Result<std::optional<Journal>> read = ReadJournal(dir);
+  if (!Exists(dir / kJournalFile)) {
+    return Fail(ErrorCode::kIo, "{}: is not there; nothing was captured",
+                (dir / kJournalFile).string());
+  }
+  Result<JournalWriter> writer = JournalWriter::Open(dir);
+  Result<std::optional<Journal>> read = writer ? ReadJournal(dir) : tl::unexpected(writer.error());
   if (!read) {
     return tl::unexpected(read.error());
   }
@@ -177,9 +194,8 @@ Result<CaptureSession> CaptureSession::Resume(const fs::path& dir, const Capture
     return Fail(ErrorCode::kBadData, "{}: plans other frames than this program takes; capture anew",
                 (dir / kJournalFile).string());
   }
-  Result<JournalWriter> writer = JournalWriter::Open(dir, journal.whole_bytes);
-  if (!writer) {
-    return tl::unexpected(writer.error());
+  if (const Status kept = writer->Keep(journal.whole_bytes); !kept) {
+    return tl::unexpected(kept.error());
   }
   return CaptureSession(dir, *std::move(rig), std::move(journal), *std::move(writer), options);
 }
@@ -219,6 +235,7 @@ FrameFile CaptureSession::FileOf(const SessionFrame& frame) const {
 Status CaptureSession::Reject(std::size_t frame, const std::string& reason) {
   journal_.done[frame].reset();
   looks_[frame].reset();
+  is_new_[frame] = false;
   ++rejected_;
   return writer_.FrameRejected(frame, reason);
 }
@@ -252,9 +269,9 @@ void CaptureSession::Tell(const Tools& tools, const char* stage, const std::stri
                      .light = light,
                      .exposure_s = exposure_s,
                      .peak = peak_};
-  if (taken_ > 0) {
+  if (settled_ > 0) {
     const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - started_;
-    event.left_s = spent.count() / taken_ * static_cast<double>(Open().size());
+    event.left_s = spent.count() / settled_ * static_cast<double>(Open().size());
   }
   tools.observer(event);
 }
@@ -270,7 +287,10 @@ Result<CaptureCheck> CaptureSession::CheckAll() {
       Result<FrameLook> look = CheckFrame(FileOf(done), rig_, {.exposure_s = *done.exposure_s},
                                           done.role, options_.checks);
       if (!look) {
-        return tl::unexpected(look.error());
+        // So that going on takes it again.
+        const bool is_bad = look.error().code == ErrorCode::kBadData && !journal_.complete;
+        const Status rejected = is_bad ? Reject(frame, look.error().message) : Status();
+        return tl::unexpected(rejected ? look.error() : rejected.error());
       }
       looks_[frame] = *std::move(look);
     }
@@ -304,17 +324,37 @@ Status CaptureSession::RejectFaults(const CaptureCheck& check) {
   return {};
 }
 
-Result<CaptureSummary> CaptureSession::Complete(CaptureCheck check) {
-  Status status;
-  if (!journal_.complete) {
-    status = writer_.Complete();
-    journal_.complete = status.has_value();
-  }
-  CaptureSummary summary{.check = std::move(check), .taken = taken_, .rejected = rejected_};
-  summary.kept = static_cast<int>(journal_.done.size()) - taken_;
+CaptureSummary CaptureSession::Summarize(CaptureCheck check) const {
+  CaptureSummary summary{.check = std::move(check), .rejected = rejected_};
+  summary.taken = static_cast<int>(std::ranges::count(is_new_, true));
+  summary.kept = static_cast<int>(journal_.done.size()) - summary.taken;
   const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - started_;
   summary.seconds = spent.count();
   summary.camera_seconds = camera_time_.count();
+  return summary;
+}
+
+// Frames of an earlier plan, whose names were others.
+void CaptureSession::RemoveOtherFrames() const {
+  std::error_code ignored;
+  for (const auto& entry : fs::directory_iterator(dir_ / "frames", ignored)) {
+    const std::string file = (fs::path("frames") / entry.path().filename()).string();
+    const bool is_ours = std::ranges::any_of(
+        journal_.done, [&](const auto& frame) { return frame && frame->file == file; });
+    if (!is_ours) {
+      fs::remove(entry.path(), ignored);
+    }
+  }
+}
+
+Result<CaptureSummary> CaptureSession::Complete(CaptureCheck check) {
+  Status status;
+  if (!journal_.complete) {
+    RemoveOtherFrames();
+    status = writer_.Complete();
+    journal_.complete = status.has_value();
+  }
+  CaptureSummary summary = Summarize(std::move(check));
   if (status) {
     summary.session = SessionOf(journal_);
     RecordShifts(summary.check, rig_, summary.session);
@@ -324,13 +364,22 @@ Result<CaptureSummary> CaptureSession::Complete(CaptureCheck check) {
     return tl::unexpected(status.error());
   }
   std::error_code ignored;
-  fs::remove_all(dir_ / "incoming", ignored);
+  fs::remove_all(dir_ / kIncoming, ignored);
   return summary;
 }
 
 Result<CaptureSummary> CaptureSession::Finish() {
-  return VerifyDone().and_then([&] { return CheckAll(); }).and_then([&](CaptureCheck check) {
-    return Complete(std::move(check));
+  Result<CaptureCheck> check = VerifyDone().and_then([&] { return CheckAll(); });
+  if (!check) {
+    return tl::unexpected(check.error());
+  }
+  if (!Exists(dir_ / kRecordFile)) {
+    return Complete(*std::move(check));
+  }
+  return ReadSessionRecord(dir_).map([&](const Session& session) {
+    CaptureSummary summary = Summarize(*std::move(check));
+    summary.session = session;
+    return summary;
   });
 }
 

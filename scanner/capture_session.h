@@ -38,7 +38,7 @@ using CaptureObserver = std::function<void(const CaptureEvent&)>;
 struct CaptureSummary {
   Session session;
   CaptureCheck check;
-  int taken = 0;                // frames, in this run
+  int taken = 0;                // frames of the session, in this run
   int kept = 0;                 // frames of earlier runs
   int rejected = 0;             // frames of this run that did not count
   double seconds = 0.0;         // this run
@@ -54,8 +54,8 @@ struct CaptureSummary {
 ///     folder            what
 ///     rig.json          the rig as it was, byte for byte
 ///     journal.jsonl     what was done (scanner/journal.h)
-///     incoming/         where the camera delivers; whatever is left there is removed
-///     frames/           00-dark.dng, 01-led-0.dng ...: renamed from incoming/ when on the disk
+///     .sateen-incoming/ where the camera delivers; whatever is left there is removed
+///     frames/           00-dark.dng, 01-led-0.dng ...: renamed from there when on the disk
 ///     session.json      last, when every frame is there and checked
 ///
 /// Exposures that are not given are found by test frames of the brightest light
@@ -74,6 +74,10 @@ struct CaptureSummary {
 /// After any error, and when this goes out of scope, all lights have been told to go off.
 class CaptureSession {
  public:
+  // Whether a capture could begin: options, rig, and a folder that holds nothing to lose. The rig.
+  [[nodiscard]] static Result<Rig> CheckBegin(const std::filesystem::path& dir,
+                                              const std::filesystem::path& rig_file,
+                                              const CaptureOptions& options);
   // Makes the folder and begins its journal. A journal of a capture that has no frame yet is begun anew.
   [[nodiscard]] static Result<CaptureSession> Begin(const std::filesystem::path& dir,
                                                     const std::filesystem::path& rig_file,
@@ -128,7 +132,9 @@ class CaptureSession {
   [[nodiscard]] Status Reject(std::size_t frame, const std::string& reason);
   [[nodiscard]] Result<CaptureCheck> CheckAll();
   [[nodiscard]] Status RejectFaults(const CaptureCheck& check);
+  [[nodiscard]] CaptureSummary Summarize(CaptureCheck check) const;
   [[nodiscard]] Result<CaptureSummary> Complete(CaptureCheck check);
+  void RemoveOtherFrames() const;
   void Tell(const Tools& tools, const char* stage, const std::string& light,
             double exposure_s) const;
 
@@ -152,9 +158,13 @@ class CaptureSession {
   double peak_ = 0.0;
   std::chrono::steady_clock::time_point started_ = std::chrono::steady_clock::now();
   std::chrono::duration<double> camera_time_{};
-  int taken_ = 0;
+  std::vector<bool> is_new_;  // done frames: taken in this run
+  int settled_ = 0;           // frames of this run that counted, also if they were rejected later
   int rejected_ = 0;
 };
+
+// In a session's folder, while it is captured.
+inline constexpr const char* kIncoming = ".sateen-incoming";
 
 // The session that a complete journal tells of.
 [[nodiscard]] Session SessionOf(const Journal& journal);

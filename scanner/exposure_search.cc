@@ -48,6 +48,7 @@ ExposureSearch::ExposureSearch(std::vector<double> times_s, const ExposureGoal& 
     times_s_.push_back(shortest);
   }
   test_ = AtMost(kFirstTest_s);
+  clipped_ = times_s_.size();
 }
 
 size_t ExposureSearch::AtMost(double time_s) const {
@@ -64,12 +65,13 @@ Status ExposureSearch::Take(const SignalLevels& levels) {
                   "down, lower the ISO, or dim the lights with --level",
                   tested);
     }
+    clipped_ = std::min(clipped_, test_);
     test_ = std::min(test_ - 1, AtMost(tested / kShorter));
     return {};
   }
   const double wanted = tested * goal_.peak / std::max(levels.peak, 1e-6);  // (1)
-  if (levels.peak < kTells && test_ + 1 < times_s_.size()) {
-    test_ = std::max(test_ + 1, AtMost(std::min(wanted, kLonger * tested)));
+  if (levels.peak < kTells && test_ + 1 < clipped_) {
+    test_ = std::clamp(AtMost(std::min(wanted, kLonger * tested)), test_ + 1, clipped_ - 1);
     return {};
   }
   if (levels.peak < kNothing) {
@@ -78,7 +80,7 @@ Status ExposureSearch::Take(const SignalLevels& levels) {
                 "off, do the lights have power, is the fabric in the picture?",
                 tested);
   }
-  const double base = times_s_[AtMost(wanted)];
+  const double base = times_s_[std::min(AtMost(wanted), clipped_ - 1)];
   found_s_.push_back(base);
   AddBrackets(levels.low * base / tested);
   return {};

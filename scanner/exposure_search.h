@@ -31,7 +31,7 @@ struct ExposureGoal {
 ///     t = t_test goal.peak / peak_test, as the camera's next shorter time                     (1)
 ///
 /// A clipped frame is tried again at an eighth, one below a tenth of full scale at the time that (1)
-/// gives, at most sixteenfold. Where the dark parts are below goal.low at t, longer exposures follow,
+/// gives, at most sixteenfold and below what was clipped. Where the dark parts are below goal.low at t, longer exposures follow,
 /// each eight times the one before, until they are not, `most` are reached, or no longer time exists.
 ///
 /// Errors   kInvalidArgument: no times to choose from
@@ -60,6 +60,7 @@ class ExposureSearch {
   std::vector<double> times_s_;
   ExposureGoal goal_;
   size_t test_ = 0;
+  size_t clipped_ = 0;  // the shortest time that was; the times' count where none was
   std::vector<double> found_s_;
 };
 

@@ -223,7 +223,7 @@ Result<std::optional<Journal>> ReadJournal(const fs::path& dir) {
   return ParseJournal(*text, path.string());
 }
 
-Result<JournalWriter> JournalWriter::Open(const fs::path& dir, std::uint64_t keep_bytes) {
+Result<JournalWriter> JournalWriter::Open(const fs::path& dir) {
   JournalWriter writer;
   writer.path_ = dir / kJournalFile;
   writer.fd_ = open(writer.path_.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0666);
@@ -236,19 +236,26 @@ Result<JournalWriter> JournalWriter::Open(const fs::path& dir, std::uint64_t kee
                 "choose another folder",
                 dir.string());
   }
-  if (ftruncate(writer.fd_, static_cast<off_t>(keep_bytes)) != 0) {
-    return Fail(ErrorCode::kIo, "{}: cannot cut off its torn last line: {}", writer.path_.string(),
-                SystemReason(errno));
-  }
-  writer.bytes_ = keep_bytes;
   if (const Status flushed = FlushToDisk(dir, dir); !flushed) {
     return tl::unexpected(flushed.error());
   }
   return writer;
 }
 
+Status JournalWriter::Keep(std::uint64_t bytes) {
+  if (ftruncate(fd_, static_cast<off_t>(bytes)) != 0) {
+    return Fail(ErrorCode::kIo, "{}: cannot cut off its torn last line: {}", path_.string(),
+                SystemReason(errno));
+  }
+  bytes_ = bytes;
+  return {};
+}
+
 JournalWriter::JournalWriter(JournalWriter&& other) noexcept
-    : path_(std::move(other.path_)), fd_(std::exchange(other.fd_, -1)), bytes_(other.bytes_) {}
+    : path_(std::move(other.path_)),
+      fd_(std::exchange(other.fd_, -1)),
+      bytes_(other.bytes_),
+      has_failed_(other.has_failed_) {}
 
 JournalWriter::~JournalWriter() {
   if (fd_ >= 0) {
@@ -257,7 +264,7 @@ JournalWriter::~JournalWriter() {
 }
 
 Status JournalWriter::Append(const std::string& line) {
-  int error_number = 0;
+  int error_number = has_failed_ ? EIO : 0;  // or a torn line could come to lie in the middle
   for (size_t written = 0; written < line.size() && error_number == 0;) {
     const ssize_t count = write(fd_, line.data() + written, line.size() - written);
     error_number = count < 0 && errno != EINTR ? errno : 0;
@@ -267,6 +274,7 @@ Status JournalWriter::Append(const std::string& line) {
     error_number = errno;
   }
   if (error_number != 0) {
+    has_failed_ = true;
     // Where that fails too, the rest is a torn last line, which readers drop.
     [[maybe_unused]] const int ignored = ftruncate(fd_, static_cast<off_t>(bytes_));
     return Fail(ErrorCode::kIo,

@@ -65,14 +65,15 @@ struct Journal {
                                                           const std::string& where);
 
 /// Appends to journal.jsonl. One program at a time: the file is locked while this lives. After an
-/// append the record is on the disk; after an error the file is as before.
+/// append the record is on the disk; after an error the file is as before, and takes nothing more.
 ///
 /// Errors   kIo: the file cannot be written or flushed; another program captures into this folder
 class JournalWriter {
  public:
-  // Creates the file, or keeps `keep_bytes` of the one that is there.
-  [[nodiscard]] static Result<JournalWriter> Open(const std::filesystem::path& dir,
-                                                  std::uint64_t keep_bytes);
+  // Locks the file, which is created where it is missing, and leaves it as it is.
+  [[nodiscard]] static Result<JournalWriter> Open(const std::filesystem::path& dir);
+  // Cuts off what is beyond these bytes; before the first append.
+  [[nodiscard]] Status Keep(std::uint64_t bytes);
   JournalWriter(JournalWriter&& other) noexcept;
   JournalWriter& operator=(JournalWriter&&) = delete;
   JournalWriter(const JournalWriter&) = delete;
@@ -93,6 +94,7 @@ class JournalWriter {
   std::filesystem::path path_;
   int fd_ = -1;
   std::uint64_t bytes_ = 0;
+  bool has_failed_ = false;
 };
 
 inline constexpr const char* kJournalFile = "journal.jsonl";

@@ -142,6 +142,9 @@ Status ConfirmAndTurnOff(LightBoard& board, const LitExposure& exposure) {
 Result<LitFrame> ExposeLit(LightBoard& board, TetheredCamera& camera, const LitExposure& exposure,
                            const CaptureOptions& options, const std::filesystem::path& folder,
                            const Task& task) {
+  if (const Status going = task.CheckCancelled(); !going) {
+    return tl::unexpected(going.error());
+  }
   if (board.state() != LightBoard::State::kReady) {
     if (const Status connected = board.Connect(); !connected) {
       return tl::unexpected(connected.error());

@@ -28,6 +28,8 @@ Status CheckAgainstJournal(const fs::path& dir, const Session& session) {
     for (SessionFrame& frame : of.frames) {
       frame.shift_px.reset();  // is found when all is captured, and no record of the capture
     }
+    of.mask.reset();  // a person may add these
+    of.table_from_sheet.reset();
     return SessionToJson(of);
   };
   if (without_shifts(SessionOf(**journal)) != without_shifts(session)) {

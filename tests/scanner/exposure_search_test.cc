@@ -83,6 +83,18 @@ TEST(ExposureSearch, StaysBelowTheLongestTime) {
   EXPECT_LE(Search(0.01, 0.5, {.longest_s = 2.0})->exposures_s[0], 2.0);
 }
 
+// A camera with three times far apart: clipped at one, all but black at the next.
+TEST(ExposureSearch, EndsBetweenTimesThatAreFarApart) {
+  Result<ExposureSearch> search = ExposureSearch::Begin({0.001, 0.02, 1.0}, {});
+  ASSERT_TRUE(search);
+  for (int test = 0; test < 4 && !search->Found(); ++test) {
+    const double rate = 60.0;  // clips at 0.02 s, shows 6 % at 0.001 s
+    const double t = search->TestTime();
+    ASSERT_TRUE(search->Take({.peak = std::min(1.0, rate * t), .low = 0.5 * rate * t}));
+  }
+  EXPECT_THAT(search->Exposures(), ElementsAre(0.001));
+}
+
 TEST(ExposureSearch, SaysWhatCannotBeExposed) {
   EXPECT_THAT(Search(1e6, 0.5).error(), IsError(ErrorCode::kBadData, "too bright"));
   EXPECT_THAT(Search(1e-5, 0.5).error(), IsError(ErrorCode::kBadData, "nothing to see"));

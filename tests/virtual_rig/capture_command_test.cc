@@ -126,6 +126,38 @@ TEST_F(CaptureCommand, ARigThatTheBoardCannotSwitchIsRefusedBeforeAnythingIsWrit
   EXPECT_FALSE(fs::exists(dir_));
 }
 
+// What `calibrate lens` leaves behind has no lights.
+TEST_F(CaptureCommand, ARigWithoutLightsIsRefused) {
+  rig_.lights.clear();
+  sateen::testing::WriteText(rig_file_, RigToJson(rig_));
+  EXPECT_EQ(Run(), 3);
+  EXPECT_THAT(log_.str(), HasSubstr("has no lights"));
+  args_.dry_run = true;
+  EXPECT_EQ(Run(), 3);
+}
+
+TEST_F(CaptureCommand, AnExposureThatNoLightMayLastIsRefusedBeforeAnyFrame) {
+  args_.exposure = "15s";
+  EXPECT_EQ(Run(), 2);
+  EXPECT_THAT(log_.str(), HasSubstr("sateen light limits"));
+  EXPECT_EQ(camera_->captures, 0);
+  EXPECT_FALSE(fs::exists(dir_));
+}
+
+TEST_F(CaptureCommand, ADryRunSeesASessionThatIsThere) {
+  ASSERT_EQ(Run(), 0) << log_.str();
+  args_.dry_run = true;
+  EXPECT_EQ(Run(), 2);
+  EXPECT_THAT(log_.str(), HasSubstr("holds a session already"));
+}
+
+TEST_F(CaptureCommand, AFolderOfSomebodyElseIsLeftAlone) {
+  fs::create_directories(dir_ / "incoming");
+  sateen::testing::WriteText(dir_ / "incoming" / "notes.txt", "mine");
+  ASSERT_EQ(Run(), 0) << log_.str();
+  EXPECT_TRUE(fs::exists(dir_ / "incoming" / "notes.txt"));
+}
+
 TEST_F(CaptureCommand, DevicesThatAreNotThereLeaveNoFolder) {
   devices_.emplace(RigDeviceNames{.port = "/dev/none"});
   EXPECT_EQ(Run(), 5);

@@ -69,7 +69,7 @@ TEST_F(CaptureTest, TakesEveryFrameOfThePlanByItsOwnLight) {
     EXPECT_EQ(records[k].times_on, k == 0 ? 2 : 1) << k;
   }
   EXPECT_EQ(*VerifySession(dir_, {}), 14);  // 13 frames and the rig
-  EXPECT_FALSE(fs::exists(dir_ / "incoming"));
+  EXPECT_FALSE(fs::exists(dir_ / kIncoming));
   // What solves read: each frame is what its light gives, to the noise of a site.
   const Capture capture = MustRead(dir_);
   ASSERT_THAT(capture.stack, SizeIs(10));
@@ -157,7 +157,64 @@ TEST_F(CaptureTest, ALightThatIsBrighterThanTheRigSaysShortensTheExposure) {
     exposures_s.insert(*frame.exposure_s);
   }
   EXPECT_THAT(exposures_s, SizeIs(1));  // all frames were taken again
+  EXPECT_EQ(summary->taken, 13);
+  EXPECT_EQ(summary->kept, 0);
+  EXPECT_EQ(summary->rejected, 1);
   EXPECT_TRUE(VerifySession(dir_, {}));
+}
+
+// A scene of three exposures a light, killed in the middle and gone on with; a frame of an earlier plan
+// does not stay.
+TEST_F(CaptureTest, BracketsAScene) {
+  std::vector<Image3> images = LightImages(rig_);
+  for (Image3& image : images) {
+    for (Image<float>& plane : image.planes) {
+      for (size_t p = 0; p < plane.pixels.size(); ++p) {
+        plane.pixels[p] *= p % static_cast<size_t>(plane.width) < 30 ? 5e-4F : 1.0F;
+      }
+    }
+  }
+  LitCamera camera(*board_, images);
+  camera.exposure_counts = true;
+  for (double time_s = 0.0005; time_s < 1.5; time_s *= 2.0) {
+    camera.times_s.push_back(time_s);
+  }
+  CaptureOptions options = QuickCapture();
+  options.exposure_s.reset();
+  options.checks.min_shade = 1.0;  // the dark stripe is all but noise at the shortest exposure
+  std::atomic<bool> cancel = false;
+  camera.on_exposed = [&](int capture) { cancel = capture == 9; };
+  {
+    Result<CaptureSession> killed = CaptureSession::Begin(dir_, rig_file_, options);
+    ASSERT_TRUE(killed);
+    EXPECT_EQ(ErrorOf(killed->Run(*host_, camera, {.threads = 1, .cancel = &cancel})).code,
+              ErrorCode::kCancelled);
+  }
+  WriteText(dir_ / "frames" / "02-led-9.dng", "of another plan");
+  camera.on_exposed = {};
+  Result<CaptureSession> session = CaptureSession::Resume(dir_, options);
+  ASSERT_TRUE(session) << session.error().message;
+  const Result<CaptureSummary> summary = session->Run(*host_, camera, {.threads = 1});
+  ASSERT_TRUE(summary) << summary.error().message;
+  EXPECT_THAT(summary->session.frames, SizeIs(2 + 3 * 10 + 1));
+  EXPECT_GT(summary->kept, 0);
+  EXPECT_EQ(*summary->session.frames[0].exposure_s, *summary->session.frames[3].exposure_s);
+  EXPECT_FALSE(fs::exists(dir_ / "frames" / "02-led-9.dng"));
+  EXPECT_TRUE(VerifySession(dir_, {}));
+  EXPECT_THAT(MustRead(dir_).stack, SizeIs(10));
+}
+
+// A mask that a person adds to a session is no damage, and stays.
+TEST_F(CaptureTest, KeepsWhatAPersonAddedToTheRecord) {
+  ASSERT_TRUE(Begin());
+  Result<Session> session = ReadSessionRecord(dir_);
+  ASSERT_TRUE(session);
+  session->mask = "mask.png";
+  WriteText(dir_ / "session.json", SessionToJson(*session));
+  EXPECT_TRUE(VerifySession(dir_, {}));
+  Result<CaptureSession> again = CaptureSession::Resume(dir_, QuickCapture());
+  ASSERT_TRUE(again && again->Finish());
+  EXPECT_EQ(ReadSessionRecord(dir_)->mask, "mask.png");
 }
 
 TEST_F(CaptureTest, ACameraWithoutExposureTimesNeedsOne) {
