@@ -400,11 +400,18 @@ TEST(NoiseOf, TakesGainAndWhiteBalanceFromTheRig) {
   response.read_noise_dn = 3.0;
   rig.response = response;
   LightStack stack(1);
+  stack[0].raw = true;
   stack[0].full_scale = 30.0F;  // of red, the largest: 2e-3 a DN, green half of that
   const StackNoise noise = NoiseOf(stack, rig).value();
   EXPECT_DOUBLE_EQ(noise[0].shot[0], 0.25 * 2e-3);
   EXPECT_DOUBLE_EQ(noise[0].shot[1], 0.25 * 1e-3);
   EXPECT_DOUBLE_EQ(noise[0].read[2], 3.0 * 1.5e-3);
+  stack[0].merged = true;
+  EXPECT_FALSE(NoiseOf(stack, rig));
+  stack[0].merged = false;
+  stack[0].raw = false;
+  EXPECT_FALSE(NoiseOf(stack, rig));
+  stack[0].raw = true;
   rig.response->gain_dn_per_electron.reset();
   EXPECT_FALSE(NoiseOf(stack, rig));
 }
