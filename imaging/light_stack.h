@@ -16,6 +16,10 @@ struct LightFrame {
   // Radiance of the file's full scale (what saturates); infinite where nothing saturates.
   float full_scale = std::numeric_limits<float>::infinity();
   std::string name;  // for messages: the file it came from
+  // Whether the samples are a camera RAW file's, so that a rig's gain and read noise are theirs.
+  bool raw = false;
+  // From several exposures, each pixel of other ones: noise is not that of one exposure.
+  bool merged = false;
 };
 
 // The frames of a session, one for each light, in the order of the lights.

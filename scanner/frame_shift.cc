@@ -10,6 +10,7 @@ namespace sateen {
 namespace {
 
 constexpr int kTaps = 6;
+constexpr double kLeastWeight = 1e-7;
 
 double Sinc(double t) {
   const double x = std::numbers::pi * t;
@@ -70,8 +71,10 @@ LanczosWindow LanczosAt(double shift) {
     h[static_cast<size_t>(m)] = Sinc(t) * Sinc(t / 3.0);  // (1)
     sum += h[static_cast<size_t>(m)];
   }
-  std::ranges::transform(h, window.weights.begin(),
-                         [&](double w) { return static_cast<float>(w / sum); });
+  // Rounding leaves 4e-17 where a whole shift has no weight at all; that must not saturate a sample.
+  std::ranges::transform(h, window.weights.begin(), [&](double w) {
+    return std::abs(w) < kLeastWeight ? 0.0F : static_cast<float>(w / sum);
+  });
   return window;
 }
 

@@ -42,7 +42,8 @@ Result<LightFrame> DevelopOne(const FrameFile& file, RawMosaic mosaic) {
     }
     const double per_exposure = 1.0 / file.exposure;
     return LightFrame{.rgb = Scaled(Demosaic(mosaic), per_exposure),
-                      .full_scale = top * static_cast<float>(per_exposure)};
+                      .full_scale = top * static_cast<float>(per_exposure),
+                      .raw = true};
   });
 }
 
@@ -89,13 +90,14 @@ Result<LightFrame> DevelopSeveral(const LightFiles& files) {
                                : reading.balance[ColourAt(last, x, y)] * site;
     }
   }
-  return LightFrame{.rgb = Demosaic(last), .full_scale = full_scale};
+  return LightFrame{.rgb = Demosaic(last), .full_scale = full_scale, .raw = true, .merged = true};
 }
 
 // Images, one or several.
 Result<LightFrame> MergePhotos(const LightFiles& files, Encoding encoding, bool& was_srgb) {
   std::vector<ExposureMerge> merges;
   LightFrame frame;
+  frame.merged = files.size() > 1;
   std::optional<float> saturation;
   for (const FrameFile& file : files) {
     const Result<Photo> photo = ReadPhoto(file.path, encoding);

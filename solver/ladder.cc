@@ -4,6 +4,8 @@
 #include <array>
 #include <chrono>
 #include <cmath>
+#include <limits>
+#include <numbers>
 #include <utility>
 
 #include "core/angle.h"
@@ -35,6 +37,16 @@ constexpr double kLeastScaleSquared = 0.1;
 constexpr double kQuarterOfOneFreedom = 0.1015;  // quantile of chi^2
 constexpr size_t kBlock = 256;                   // pixels that are looked at together
 constexpr size_t kMisfitsLookedAt = 1 << 14;
+// Rounding's variance is 1/12 of a step squared, of which 1/6 goes for the variance of a sample; of
+// the second differences that do not vanish at least this share are single steps.
+constexpr double kRoundingOfStep = 6.0 / 12.0;
+constexpr double kShareOfSteps = 0.05;
+// Second differences below this fraction of the first, or of the samples, vanish: steps of equal
+// size, of an 8-bit file as sRGB, too, and what rounding to float leaves of nothing.
+constexpr float kLeastBend = 0.02F;
+constexpr float kFloatBend = 4.0F * std::numeric_limits<float>::epsilon();
+constexpr auto kFloatStep = static_cast<double>(std::numeric_limits<float>::epsilon());
+constexpr double kNotKnown = std::numeric_limits<double>::infinity();
 constexpr float kUnexplainedFactor = 3.0F;
 // Where more pixels than this climb, the model is wrong in what noise hides in the others, too.
 constexpr double kDoubtfulShare = 0.2;
@@ -44,77 +56,127 @@ double SecondsSince(Clock::time_point start) {
 }
 
 // Quantile of the normal distribution, for share >= 0.5 or below by symmetry: Abramowitz and Stegun
-// 26.2.23, to 4.5e-4.
+// 26.2.23, to 4.5e-4, and a step of Newton's.
 double NormalQuantile(double share) {
   if (share < 0.5) {
     return -NormalQuantile(1.0 - share);
   }
   const double t = std::sqrt(-2.0 * std::log(1.0 - share));
-  return t - (2.515517 + t * (0.802853 + t * 0.010328)) /
-                 (1.0 + t * (1.432788 + t * (0.189269 + t * 0.001308)));
+  const double z = t - (2.515517 + t * (0.802853 + t * 0.010328)) /
+                           (1.0 + t * (1.432788 + t * (0.189269 + t * 0.001308)));
+  const double beyond = 0.5 * std::erfc(z / std::numbers::sqrt2);
+  const double density = std::exp(-0.5 * z * z) / std::sqrt(2.0 * std::numbers::pi);
+  return z + (beyond - (1.0 - share)) / density;
 }
 
 bool IsSolved(const NormalField& field, size_t pixel) {
   return field.reason.pixels[pixel] == static_cast<uint8_t>(Reason::kSolved);
 }
 
-// How many usable samples most solved pixels have, of those that leave a residual; 0: none.
-int UsualSamples(const NormalField& field, size_t stride) {
+// Solved pixels at equal distances in their own order: what is looked at depends neither on the
+// threads nor on how much of the image the mask leaves out.
+std::vector<size_t> PixelsLookedAt(const NormalField& field) {
+  const size_t step =
+      std::max<size_t>(1, static_cast<size_t>(field.summary.solved) / kMisfitsLookedAt);
+  std::vector<size_t> pixels;
+  size_t solved = 0;
+  for (size_t p = 0; p < field.reason.pixels.size(); ++p) {
+    if (IsSolved(field, p) && solved++ % step == 0) {
+      pixels.push_back(p);
+    }
+  }
+  return pixels;
+}
+
+// How many usable samples most of these pixels have, of those that leave a residual; 0: none.
+int UsualSamples(const NormalField& field, std::span<const size_t> pixels) {
   std::array<int64_t, 256> counts = {};
-  for (size_t p = 0; p < field.samples.pixels.size(); p += stride) {
-    counts[field.samples.pixels[p]] += IsSolved(field, p) ? 1 : 0;
+  for (const size_t p : pixels) {
+    ++counts[field.samples.pixels[p]];
   }
   const auto most = std::max_element(counts.begin() + 4, counts.end());
   return *most > 0 ? static_cast<int>(most - counts.begin()) : 0;
 }
 
+float QuantileOf(std::vector<float>& values, double share) {
+  const auto place =
+      values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), place, values.end());
+  return *place;
+}
+
+// What neighbouring samples tell of the noise.
+struct Neighbours {
+  double scale_squared = kNotKnown;  // infinite where they tell nothing
+  double floor = 0.0;                // of s^2: what rounding to float leaves, in exact frames, too
+};
+
 // s^2 where noise is unknown, var = s^2 i, from second differences along the rows of green samples,
 // of variance 6 var: too large by what the surface does from pixel to pixel, not by what the model
-// does not know. Infinite where there are none.
-double ScaleSquaredOfNeighbours(const LightStack& stack, const NormalField& field, size_t stride) {
+// does not know. Differences that vanish are the work of rounding to few bits, which is not without
+// noise: where they are many, s^2 is the mean, and at least the variance of rounding, 1/12 of a step
+// squared.
+Neighbours LookAtNeighbours(const LightStack& stack, const NormalField& field,
+                            std::span<const size_t> pixels) {
   std::vector<float> squares;
+  double sum_of_squares = 0.0;
+  double sum_of_means = 0.0;
+  size_t count = 0;
   const auto width = static_cast<size_t>(field.reason.width);
-  for (size_t p = 1; p + 1 < field.reason.pixels.size(); p += stride) {
-    const bool inside = p % width > 0 && p % width + 1 < width && IsSolved(field, p - 1) &&
-                        IsSolved(field, p) && IsSolved(field, p + 1);
+  for (const size_t p : pixels) {
+    const bool inside =
+        p % width > 0 && p % width + 1 < width && IsSolved(field, p - 1) && IsSolved(field, p + 1);
     for (size_t k = 0; inside && k < stack.size(); ++k) {
       const float* i = stack[k].rgb[1].pixels.data() + p;
       const float bend = i[-1] - 2.0F * i[0] + i[1];
       const float mean = (i[-1] + i[0] + i[1]) / 3.0F;
-      if (mean > 0.0F && std::isfinite(bend) && i[0] < stack[k].full_scale) {
+      if (!(mean > 0.0F && std::isfinite(bend) && i[0] < stack[k].full_scale)) {
+        continue;
+      }
+      ++count;
+      sum_of_means += static_cast<double>(mean);
+      if (std::abs(bend) > std::max(kLeastBend * std::abs(i[1] - i[-1]), kFloatBend * mean)) {
         squares.push_back(bend * bend / (6.0F * mean));
+        sum_of_squares += static_cast<double>(squares.back());
       }
     }
   }
   if (squares.empty()) {
-    return INFINITY;
+    return {};
   }
-  const auto place = squares.begin() + static_cast<std::ptrdiff_t>(squares.size() / 4);
-  std::nth_element(squares.begin(), place, squares.end());
-  return static_cast<double>(*place) / kQuarterOfOneFreedom;
+  const auto all = static_cast<double>(count);
+  const double of_float = kFloatStep * kFloatStep / 12.0 * sum_of_means / all;
+  const auto quarter = static_cast<double>(QuantileOf(squares, 0.25));
+  if (4 * squares.size() >= 3 * count) {
+    return {.scale_squared = quarter / kQuarterOfOneFreedom, .floor = of_float};
+  }
+  const auto least = static_cast<double>(QuantileOf(squares, kShareOfSteps));
+  return {.scale_squared = std::max(sum_of_squares / all, kRoundingOfStep * quarter),
+          .floor = std::max(of_float, kRoundingOfStep * least)};
 }
 
-// s^2. Looks at pixels at equal distances, so that it does not depend on the threads.
+// s^2; infinite where nothing tells of it.
 double NoiseScaleSquared(const LightStack& stack, const NormalField& field,
                          const Image<float>& misfit, bool known) {
-  const size_t stride = std::max<size_t>(1, misfit.pixels.size() / kMisfitsLookedAt);
-  const int usual = UsualSamples(field, stride);
-  if (usual == 0) {
-    return 1.0;
-  }
-  std::vector<float> misfits;
-  for (size_t p = 0; p < misfit.pixels.size(); p += stride) {
-    if (IsSolved(field, p) && field.samples.pixels[p] == usual) {
-      misfits.push_back(misfit.pixels[p]);
+  const std::vector<size_t> pixels = PixelsLookedAt(field);
+  const int usual = UsualSamples(field, pixels);
+  double scale = kNotKnown;
+  if (usual > 0) {
+    std::vector<float> misfits;
+    for (const size_t p : pixels) {
+      if (field.samples.pixels[p] == usual) {
+        misfits.push_back(misfit.pixels[p]);
+      }
     }
+    const double share = known ? kShareOfKnown : kShareOfUnknown;
+    scale = static_cast<double>(QuantileOf(misfits, share)) / ChiSquaredQuantile(share, usual - 3);
   }
-  const double share = known ? kShareOfKnown : kShareOfUnknown;
-  const auto place = misfits.begin() +
-                     static_cast<std::ptrdiff_t>(share * static_cast<double>(misfits.size() - 1));
-  std::nth_element(misfits.begin(), place, misfits.end());
-  const double scale = static_cast<double>(*place) / ChiSquaredQuantile(share, usual - 3);
-  return known ? std::clamp(scale, kLeastScaleSquared, 1.0)
-               : std::min(scale, ScaleSquaredOfNeighbours(stack, field, stride));
+  if (known) {
+    return std::clamp(scale, kLeastScaleSquared, 1.0);
+  }
+  const Neighbours neighbours = LookAtNeighbours(stack, field, pixels);
+  scale = std::max(std::min(scale, neighbours.scale_squared), neighbours.floor);
+  return scale > 0.0 ? scale : kNotKnown;
 }
 
 // What the second pass knows.
@@ -129,6 +191,9 @@ struct Climb {
 
 bool NeedsConsensus(const Climb& climb, const NormalField& field, const Image<float>& misfit,
                     size_t pixel) {
+  if (field.samples.pixels[pixel] <= 3) {
+    return false;  // three samples always agree
+  }
   if (climb.options.mode != LadderMode::kAuto) {
     return climb.options.mode == LadderMode::kConsensus;
   }
@@ -150,7 +215,6 @@ struct PieceSummary {
   double least_squares_deg = 0.0;  // sums
   double robust_deg = 0.0;
   double turned_deg = 0.0;
-  double robust_seconds = 0.0;  // of this thread
 
   void Add(const PieceSummary& other) {
     least_squares += other.least_squares;
@@ -160,7 +224,6 @@ struct PieceSummary {
     least_squares_deg += other.least_squares_deg;
     robust_deg += other.robust_deg;
     turned_deg += other.turned_deg;
-    robust_seconds += other.robust_seconds;
   }
 };
 
@@ -220,32 +283,31 @@ void KeepOrClimb(const Climb& climb, const Image<float>& misfit, size_t begin, s
   }
   int suspects = always ? 1 : 0;
   for (size_t p = begin; p < end; ++p) {
-    uncertainty[p] = std::min(180.0F, uncertainty[p] * scale);
+    // In this order the minimum of 180 and not-a-number, of an infinite scale, is 180.
+    uncertainty[p] = reason[p] == kSolvedCode ? std::min(180.0F, uncertainty[p] * scale) : 0.0F;
     suspects |= misfits[p] > lowest ? 1 : 0;
   }
-  float sum_deg = 0.0F;
+  double sum_deg = 0.0;
   for (size_t p = begin; p < end; ++p) {
-    sum_deg += uncertainty[p];
+    sum_deg += static_cast<double>(uncertainty[p]);  // zero where unsolved
   }
   if (suspects != 0 && !never) {
     for (size_t p = begin; p < end; ++p) {
       if (IsSolved(field, p) && NeedsConsensus(climb, field, misfit, p)) {
         pixels.push_back(p);
         --solved;
-        unchecked -= field.samples.pixels[p] <= 3 ? 1 : 0;
-        sum_deg -= field.uncertainty.pixels[p];
+        sum_deg -= static_cast<double>(uncertainty[p]);
       }
     }
   }
   summary.least_squares += solved - unchecked;
   summary.unchecked += unchecked;
-  summary.least_squares_deg += static_cast<double>(sum_deg);
+  summary.least_squares_deg += sum_deg;
 }
 
 // Rung 2 for the pixels of one piece.
 void ClimbPixels(const Climb& climb, int begin, int end, std::span<const size_t> pixels,
                  NormalField& field, PieceSummary& summary) {
-  const Clock::time_point start = Clock::now();
   std::vector<Eigen::Vector3f> before;
   before.reserve(pixels.size());
   for (const size_t pixel : pixels) {
@@ -273,7 +335,6 @@ void ClimbPixels(const Climb& climb, int begin, int end, std::span<const size_t>
     summary.robust_deg += static_cast<double>(uncertainty);
   }
   summary.robust += static_cast<int64_t>(pixels.size());
-  summary.robust_seconds += SecondsSince(start);
 }
 
 PieceSummary ClimbRows(const Climb& climb, const Image<float>& misfit, int begin, int end,
@@ -311,6 +372,23 @@ Status DoubtLeastSquares(const Task& task, NormalField& field, PieceSummary& tot
     total.least_squares_deg += sum;
   }
   return status;
+}
+
+Status CheckNoise(const std::optional<StackNoise>& noise, const LightStack& stack) {
+  for (size_t k = 0; noise && k < stack.size(); ++k) {
+    for (size_t c = 0; c < 3; ++c) {
+      const double shot = (*noise)[k].shot[c];
+      const double read = (*noise)[k].read[c];
+      if (!(std::isfinite(shot) && std::isfinite(read) && shot >= 0.0 && read >= 0.0 &&
+            shot + read > 0.0)) {
+        return Fail(ErrorCode::kInvalidArgument,
+                    "noise of {}, channel {}: shot = {:g}, read = {:g}; need both finite and >= 0, "
+                    "and one of them > 0",
+                    stack[k].name, c, shot, read);
+      }
+    }
+  }
+  return {};
 }
 
 void Report(const PieceSummary& total, double climbing_seconds, SolveSummary& summary) {
@@ -363,6 +441,12 @@ std::optional<LadderMode> LadderModeNamed(std::string_view name) {
 }
 
 double ChiSquaredQuantile(double share, int freedom) {
+  if (freedom == 1) {
+    return std::pow(NormalQuantile(0.5 * (1.0 + share)), 2.0);
+  }
+  if (freedom == 2) {
+    return -std::log(1.0 - share);
+  }
   const double v = 2.0 / (9.0 * freedom);
   return std::pow(std::max(0.0, 1.0 - v + NormalQuantile(share) * std::sqrt(v)), 3.0);
 }
@@ -388,6 +472,9 @@ Status SolveLadderInto(const LightStack& stack, const Rig& rig, const std::optio
   if (options.noise && options.noise->size() != stack.size()) {
     return Fail(ErrorCode::kBadData, "noise of {} frames, but {} frames", options.noise->size(),
                 stack.size());
+  }
+  if (Status status = CheckNoise(options.noise, stack); !status) {
+    return status;
   }
   const StackNoise noise = options.noise ? *options.noise : UnknownNoise(stack.size());
   Image<float> misfit(stack.empty() ? ImageSize{} : stack[0].rgb.Size());
@@ -415,7 +502,8 @@ Status SolveLadderInto(const LightStack& stack, const Rig& rig, const std::optio
   for (size_t usable = 0; usable < 4; ++usable) {
     climb.limit[usable] = INFINITY;
   }
-  field.summary.noise_scale = std::sqrt(climb.scale_squared);
+  field.summary.noise_scale =
+      std::isfinite(climb.scale_squared) ? std::sqrt(climb.scale_squared) : 0.0;
   field.summary.noise_known = options.noise.has_value();
   const Status status = ClimbAllRows(climb, misfit, task, field);
   field.summary.seconds = SecondsSince(start);

@@ -11,7 +11,7 @@ namespace sateen {
 enum class LadderMode {
   kAuto,          // each pixel takes the lowest rung that explains its samples
   kLeastSquares,  // rung 1 on every pixel
-  kConsensus      // rung 2 on every pixel
+  kConsensus      // rung 2 on every pixel of more than three samples
 };
 
 // "auto", "least-squares", "robust".
@@ -51,6 +51,9 @@ struct LadderOptions {
 /// all directions). s^2 is the 25th percentile (5th where the noise is unknown) of the misfits over
 /// that of chi^2: at most 1 where the noise is known, because demosaicing only takes noise away; at
 /// most what neighbouring pixels differ by where it is not, because a shiny scene misfits everywhere.
+/// Never below what rounding of the samples leaves, which in smooth frames may be all there is.
+/// Where the noise is unknown and no pixel has more than three samples, s^2 is what neighbours differ
+/// by; where they tell nothing either, uncertainty = 180: unknown.
 ///
 /// Rung 2, consensus, where misfit / s^2 is above the (1 - false_alarms) quantile of chi^2 and the
 /// residual above explained_residual |N|. With the sum a_c of i'_kc over the usable samples and its
@@ -90,8 +93,8 @@ struct LadderOptions {
                                      const std::optional<Mask>& mask, const LadderOptions& options,
                                      const Task& task, NormalField& field);
 
-// The `share` quantile of chi^2 over its degrees of freedom, by Wilson and Hilferty's cube root:
-// within 1 % from 3 degrees of freedom up.
+// The `share` quantile of chi^2 over its degrees of freedom: of one and two in closed form, beyond
+// by Wilson and Hilferty's cube root, within 4 % for shares of 0.05 and more.
 [[nodiscard]] double ChiSquaredQuantile(double share, int freedom);
 
 }  // namespace sateen

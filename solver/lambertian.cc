@@ -137,6 +137,10 @@ void ClearRows(const std::optional<Mask>& mask, int row_begin, int row_end, Norm
       field.albedo[c].pixels[p] = 0.0F;
     }
     field.residual.pixels[p] = 0.0F;
+    if (!field.model.pixels.empty()) {  // of a ladder
+      field.uncertainty.pixels[p] = 0.0F;
+      field.model.pixels[p] = static_cast<uint8_t>(Rung::kNone);
+    }
     field.samples.pixels[p] = 0;
     const bool inside = !mask || mask->pixels[p] != 0;
     field.reason.pixels[p] = static_cast<uint8_t>(inside ? kPending : Reason::kOutsideMask);

@@ -85,7 +85,7 @@ struct SolveSummary {
   int64_t unexplained = 0;
   int64_t unchecked = 0;
   double turned_deg = 0.0;   // mean angle by which rung 2 turned its pixels' normals
-  double noise_scale = 0.0;  // s of solver/ladder.h; 0 without a ladder
+  double noise_scale = 0.0;  // s of solver/ladder.h; 0: without a ladder, or not known
   bool noise_known = false;
   double seconds = 0.0;
   int threads = 0;

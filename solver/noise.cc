@@ -12,7 +12,7 @@ std::optional<StackNoise> NoiseOf(const LightStack& stack, const Rig& rig) {
   const Eigen::Vector3d share = response.white_balance / response.white_balance.maxCoeff();
   StackNoise noise;
   for (const LightFrame& frame : stack) {
-    if (!std::isfinite(frame.full_scale)) {
+    if (!frame.raw || frame.merged || !std::isfinite(frame.full_scale)) {
       return std::nullopt;
     }
     const Eigen::Vector3d unit =

@@ -27,8 +27,10 @@ inline constexpr float kLeastCosine = 0.02F;
 ///
 ///     shot_c = gain u_c,   read_c = read_noise u_c                                        (1)
 ///
-/// Nothing where the rig has no gain or read noise, or a frame no full scale. Demosaicing averages
-/// sites, so that pixels have less noise than this; the ladder measures by how much.
+/// Nothing where the rig has no gain or read noise, or a frame no full scale; nor where a frame is not
+/// camera RAW, which the rig's figures say nothing about, or merged from several exposures, whose
+/// noise (1) would give as that of the shortest one. Demosaicing averages sites, so that pixels have
+/// less noise than this; the ladder measures by how much.
 [[nodiscard]] std::optional<StackNoise> NoiseOf(const LightStack& stack, const Rig& rig);
 
 // Shot noise of unknown gain: right but for one factor, which the ladder measures.

@@ -65,6 +65,15 @@ TEST(LayOverFirst, ASaturatedSampleSaturatesAllThatItHasAPartIn) {
   EXPECT_NEAR(frame.rgb[1].At(20, 15), 0.5F, 1e-6F);
 }
 
+TEST(LayOverFirst, AWholeShiftSaturatesOneSampleForOne) {
+  LightFrame frame = FrameOf([](double, double) { return 0.5; });
+  frame.rgb[1].At(20, 15) = 7.0F;
+  LayOverFirst({1.0, 0.0}, frame);
+  for (int x = 14; x <= 25; ++x) {
+    EXPECT_EQ(frame.rgb[1].At(x, 15), x == 19 ? frame.full_scale : 0.5F) << x;
+  }
+}
+
 TEST(LayOverFirst, OvershootIsNoSaturation) {
   LightFrame frame = FrameOf([](double x, double) { return x < 20.0 ? 0.0 : 1.99; });
   LayOverFirst({0.5, 0.0}, frame);

@@ -17,6 +17,7 @@ namespace sateen {
 namespace {
 
 using testing::DistantRig;
+using testing::ReasonAt;
 using testing::Render;
 using testing::SameBits;
 using testing::SetSample;
@@ -372,6 +373,136 @@ TEST(SolveLadder, ChiSquaredQuantiles) {
   EXPECT_NEAR(ChiSquaredQuantile(0.25, 7) * 7.0, 4.255, 0.05);
   EXPECT_NEAR(ChiSquaredQuantile(0.999, 7) * 7.0, 24.322, 0.25);
   EXPECT_NEAR(ChiSquaredQuantile(0.05, 93) * 93.0, 71.76, 0.2);
+  EXPECT_NEAR(ChiSquaredQuantile(0.05, 1), 0.00393, 1e-5);
+  EXPECT_NEAR(ChiSquaredQuantile(0.999, 1), 10.828, 1e-3);
+  EXPECT_NEAR(ChiSquaredQuantile(0.05, 2) * 2.0, 0.10259, 1e-5);
+  EXPECT_NEAR(ChiSquaredQuantile(0.999, 2) * 2.0, 13.816, 1e-3);
+  // The cube root is at its worst.
+  EXPECT_NEAR(ChiSquaredQuantile(0.05, 3) * 3.0, 0.35185, 0.07 * 0.35185);
+  EXPECT_NEAR(ChiSquaredQuantile(0.999, 3) * 3.0, 16.266, 0.02 * 16.266);
+}
+
+// Root mean square of the actual angles over that of the uncertainties, where rung 1 gives them; 1 =
+// honest.
+double ActualOverReported(const NormalField& field, const RenderedRelief& truth) {
+  Image<float> error;
+  EXPECT_TRUE(AngularErrorDeg(field, truth.normal, &error));
+  double actual = 0.0;
+  double reported = 0.0;
+  for (size_t p = 0; p < error.pixels.size(); ++p) {
+    if (ReasonAt(field, p) == Reason::kSolved &&
+        field.model.pixels[p] <= static_cast<uint8_t>(Rung::kUnchecked)) {
+      actual += std::pow(static_cast<double>(error.pixels[p]), 2.0);
+      reported += std::pow(static_cast<double>(field.uncertainty.pixels[p]), 2.0);
+    }
+  }
+  return std::sqrt(actual / reported);
+}
+
+RenderedRelief RippleOf(const SensorModel& sensor, const Rig& rig, ImageSize size) {
+  return RenderRelief(
+             {.shape = ReliefShape::kRipple, .max_slope_rad = 15.0 * kRadPerDeg, .sensor = sensor},
+             rig, size)
+      .value();
+}
+
+TEST(SolveLadder, ASmallMaskInALargeImageHasItsOwnNoise) {
+  const Rig rig = TwoRings();
+  const ImageSize size{1008, 690};  // every 42nd pixel of the image would miss the mask
+  const RenderedRelief rendered = RippleOf({.full_scale = 2.0}, rig, size);
+  Mask mask(size, 0);
+  for (int y = 300; y < 310; ++y) {
+    for (int x = 505; x < 515; ++x) {
+      mask.At(x, y) = 255;
+    }
+  }
+  const NormalField field = SolveLadder(rendered.stack, rig, mask).value();
+  EXPECT_EQ(field.summary.solved, 100);
+  EXPECT_NEAR(ActualOverReported(field, rendered), 1.0, 0.4);
+}
+
+TEST(SolveLadder, NeighboursTellTheNoiseOfThreeLights) {
+  const Rig rig = DistantRig(DistantRing(3, 40.0 * kRadPerDeg));
+  const RenderedRelief rendered = RippleOf({.full_scale = 2.0}, rig, {160, 100});
+  const NormalField field = MustSolve(rendered.stack, rig);
+  EXPECT_EQ(field.summary.unchecked, 16000);
+  EXPECT_GT(ActualOverReported(field, rendered), 0.5);
+  EXPECT_LT(ActualOverReported(field, rendered), 1.5);
+}
+
+TEST(SolveLadder, UncertaintyIsUnknownWhereNothingTellsOfTheNoise) {
+  const Rig rig = DistantRig(DistantRing(3, 40.0 * kRadPerDeg));
+  const RenderedRelief rendered = RippleOf({.full_scale = 2.0}, rig, {2, 3});  // no neighbours
+  Mask mask({2, 3}, 255);
+  mask.At(0, 0) = 0;
+  const NormalField field = SolveLadder(rendered.stack, rig, mask).value();
+  EXPECT_EQ(field.uncertainty.At(0, 0), 0.0F);
+  EXPECT_EQ(field.uncertainty.At(1, 0), 180.0F);
+  EXPECT_EQ(field.summary.least_squares.mean_uncertainty_deg, 180.0);
+  EXPECT_EQ(field.summary.noise_scale, 0.0);
+}
+
+TEST(SolveLadder, SmoothFramesOfEightBitsAreNotWithoutNoise) {
+  const SensorModel eight_bits{.bits = 8, .electrons = 1e9, .read_noise_electrons = 0.0};
+  for (const int count : {3, 4, 10}) {
+    const Rig rig = count == 10 ? TwoRings() : DistantRig(DistantRing(count, 40.0 * kRadPerDeg));
+    for (const double period_px : {40.0, 400.0}) {
+      const RenderedRelief rendered = RenderRelief({.shape = ReliefShape::kRipple,
+                                                    .max_slope_rad = 15.0 * kRadPerDeg,
+                                                    .ripple_period_px = period_px,
+                                                    .sensor = eight_bits},
+                                                   rig, {400, 300})
+                                          .value();
+      const NormalField field = MustSolve(rendered.stack, rig);
+      EXPECT_GT(ActualOverReported(field, rendered), 1.0 / 3.0) << count << ", " << period_px;
+      EXPECT_LT(ActualOverReported(field, rendered), 3.0) << count << ", " << period_px;
+      EXPECT_LT(field.summary.robust.pixels, 120000 / 20) << count << ", " << period_px;
+    }
+  }
+}
+
+TEST(SolveLadder, AFieldThatIsUsedAgainKeepsNothing) {
+  const Rig rig = TwoRings();
+  const RenderedRelief rendered = RippleOf({.full_scale = 2.0}, rig, {40, 30});
+  Mask mask({40, 30}, 0);
+  std::fill_n(mask.pixels.begin(), 600, uint8_t{255});
+  for (const Backend backend : {Backend::kAuto, Backend::kJacobiSvd}) {
+    LadderOptions options;
+    options.least_squares.backend = backend;
+    const NormalField fresh = SolveLadder(rendered.stack, rig, mask, options).value();
+    NormalField field = MustSolve(rendered.stack, rig, options);
+    ASSERT_TRUE(SolveLadderInto(rendered.stack, rig, mask, options, {}, field));
+    EXPECT_EQ(field.uncertainty.pixels, fresh.uncertainty.pixels);
+    EXPECT_EQ(field.model.pixels, fresh.model.pixels);
+    EXPECT_EQ(field.summary.least_squares.mean_uncertainty_deg,
+              fresh.summary.least_squares.mean_uncertainty_deg);
+  }
+}
+
+TEST(SolveLadder, ThreeSamplesAreUncheckedInEveryMode) {
+  const Rig rig = DistantRig(DistantRing(3, 40.0 * kRadPerDeg));
+  const RenderedRelief rendered = Render(rig, {40, 30}, 15.0);
+  const NormalField field = MustSolve(rendered.stack, rig, Forced(LadderMode::kConsensus));
+  EXPECT_EQ(field.summary.unchecked, 1200);
+  EXPECT_EQ(field.summary.unexplained, 0);
+  EXPECT_EQ(field.model.pixels[600], static_cast<uint8_t>(Rung::kUnchecked));
+}
+
+TEST(SolveLadder, NamesTheFrameWhoseNoiseIsOutOfRange) {
+  const Rig rig = TwoRings();
+  RenderedRelief rendered = Render(rig, {4, 3});
+  rendered.stack[2].name = "third.dng";
+  for (const SampleNoise& bad :
+       {SampleNoise{.shot = {1.0, -1.0, 1.0}}, SampleNoise{.read = {0.0, 0.0, std::nan("")}},
+        SampleNoise{.shot = {INFINITY, 1.0, 1.0}}, SampleNoise{.shot = {0.0, 1.0, 1.0}}}) {
+    LadderOptions options;
+    options.noise = UnknownNoise(10);
+    (*options.noise)[2] = bad;
+    const Result<NormalField> field = SolveLadder(rendered.stack, rig, std::nullopt, options);
+    ASSERT_FALSE(field);
+    EXPECT_EQ(field.error().code, ErrorCode::kInvalidArgument);
+    EXPECT_NE(field.error().message.find("third.dng"), std::string::npos);
+  }
 }
 
 TEST(SolveLadder, NamesTheOptionThatIsOutOfRange) {
@@ -400,11 +531,18 @@ TEST(NoiseOf, TakesGainAndWhiteBalanceFromTheRig) {
   response.read_noise_dn = 3.0;
   rig.response = response;
   LightStack stack(1);
+  stack[0].raw = true;
   stack[0].full_scale = 30.0F;  // of red, the largest: 2e-3 a DN, green half of that
   const StackNoise noise = NoiseOf(stack, rig).value();
   EXPECT_DOUBLE_EQ(noise[0].shot[0], 0.25 * 2e-3);
   EXPECT_DOUBLE_EQ(noise[0].shot[1], 0.25 * 1e-3);
   EXPECT_DOUBLE_EQ(noise[0].read[2], 3.0 * 1.5e-3);
+  stack[0].merged = true;
+  EXPECT_FALSE(NoiseOf(stack, rig));
+  stack[0].merged = false;
+  stack[0].raw = false;
+  EXPECT_FALSE(NoiseOf(stack, rig));
+  stack[0].raw = true;
   rig.response->gain_dn_per_electron.reset();
   EXPECT_FALSE(NoiseOf(stack, rig));
 }
