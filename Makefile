@@ -20,7 +20,7 @@ CTEST = ctest --output-on-failure --no-tests=error -j$(JOBS)
 OUR_SOURCES = git ls-files -z --cached --others --exclude-standard '*.h' '*.cc' '*.c'
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo build test bench firmware flash fuzz format format-check tidy asan tsan clean
+.PHONY: help setup demo programs build test bench firmware flash fuzz format format-check tidy asan tsan clean
 
 help:  ## This list
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 16
@@ -28,12 +28,17 @@ help:  ## This list
 setup:  ## Install the Debian packages that are missing (packages.txt)
 	@tools/setup
 
-demo: build  ## Capture, calibrate and solve on the virtual rig, compare with the truth
+demo: programs  ## Capture, calibrate and solve on the virtual rig, compare with the truth
 	@samples/demo.sh
 
 build: setup  ## Build everything into build/release
 	@cmake --preset $(PRESET) --log-level=WARNING
 	@cmake --build --preset $(PRESET) -j$(JOBS)
+
+programs: setup  ## Build what people run, without tests and benchmarks
+	@cmake --preset $(PRESET) --log-level=WARNING
+	@cmake --build --preset $(PRESET) -j$(JOBS) --target sateen sateen-virtual-rig \
+	    sateen-camera-worker sateen-virtual-port sateen_firmware
 
 test: build  ## Build and run all tests
 	@$(CTEST) --test-dir build/release

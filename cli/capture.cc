@@ -53,7 +53,7 @@ std::string StageText(const CaptureEvent& event) {
   std::string text = event.stage == "metering" ? "metering " + event.light : event.light;
   text += ", " + ExposureText(event.exposure_s);
   if (event.peak > 0.0) {
-    text += fmt::format(", peak {:.0f} %", 100.0 * event.peak);
+    text += fmt::format(", last peak {:.0f} %", 100.0 * event.peak);
   }
   if (event.left_s) {
     text += fmt::format(", {:.0f} s left", *event.left_s);
@@ -63,6 +63,9 @@ std::string StageText(const CaptureEvent& event) {
 
 CaptureObserver ShowOn(const Task& task) {
   return [&task](const CaptureEvent& event) {
+    if (event.stage == "capturing" && event.light.empty()) {
+      return;  // a frame counts; the next event names the light that is on
+    }
     task.BeginStage(StageText(event), static_cast<int>(event.frames));
     task.Advance(static_cast<int>(event.done));
   };
@@ -179,7 +182,7 @@ int RunCaptureByDaemon(const CaptureArgs& args, const DaemonClient& daemon, cons
   if (args.dry_run) {
     return Report({ErrorCode::kDevice,
                    fmt::format("the daemon at {} has the rig, and a dry run opens board and camera "
-                               "by itself; stop it first, or name them: --port, --camera",
+                               "by itself; stop the daemon first",
                                daemon.Socket().string())},
                   log);
   }

@@ -130,10 +130,18 @@ Status WriteOverview(const SessionOverviewArgs& args, const Task& task) {
       }
       panels->push_back(std::move(empty));
     }
-    panels = MapPanels(args.maps).map([&](std::vector<Rgb8> maps) {
-      panels->insert(panels->end(), maps.begin(), maps.end());
-      return *std::move(panels);
-    });
+    panels =
+        MapPanels(args.maps).and_then([&](std::vector<Rgb8> maps) -> Result<std::vector<Rgb8>> {
+          if (maps.front()[0].Size() != panels->front()[0].Size()) {
+            return Fail(
+                ErrorCode::kBadData,
+                "{}: its maps are of another shape than the frames of {}; name the maps of a "
+                "solve of this session",
+                args.maps.string(), args.session.string());
+          }
+          panels->insert(panels->end(), maps.begin(), maps.end());
+          return *std::move(panels);
+        });
   }
   if (!panels) {
     return tl::unexpected(panels.error());

@@ -50,8 +50,10 @@ void ProgressBar::Advance(int steps) {
     return;
   }
   const std::lock_guard lock(mutex_);
+  const bool is_first = done_ == 0;  // a stage that begins in the middle shows so at once
   done_ += steps;
-  if (!stage_.empty() && std::chrono::steady_clock::now() - drawn_at_ >= kMinInterval) {
+  if (!stage_.empty() &&
+      (is_first || std::chrono::steady_clock::now() - drawn_at_ >= kMinInterval)) {
     Draw();
   }
 }

@@ -73,7 +73,7 @@ Result<ExposureSettings> CaptureSession::Configure(double exposure_s, TetheredCa
     return configured_->settings;
   }
   configured_.reset();
-  const Result<ExposureSettings> set = camera.Configure(
+  Result<ExposureSettings> set = camera.Configure(
       {.exposure_s = exposure_s, .f_number = journal_.begun.f_number, .iso = journal_.begun.iso});
   if (set) {
     configured_ = Configured{exposure_s, *set};

@@ -402,7 +402,7 @@ bool IsSignificant(const Shift& shift) {
 std::vector<Shift> RegisterFrames(const FramesToRegister& input, double min_peak) {
   constexpr size_t kFewestFrames = 5;
   constexpr double kFarPx = 0.7;
-  const std::vector<Shift> nothing(input.frames.size());
+  std::vector<Shift> nothing(input.frames.size());
   if (input.frames.size() < kFewestFrames) {
     return nothing;
   }
