@@ -5,9 +5,9 @@
 namespace sateen {
 namespace {
 
-constexpr int kAround = 2;  // samples of a kind to each side
+constexpr int kSamplesAround = 2;  // samples of a kind to each side
 
-// Sums of kAround samples to each side, `stride` apart, along rows or along columns.
+// Sums of kSamplesAround samples to each side, `stride` apart, along rows or along columns.
 void SumAlong(bool rows, int stride, Image<float>& image) {
   const int count = rows ? image.width : image.height;
   const int lines = rows ? image.height : image.width;
@@ -21,7 +21,7 @@ void SumAlong(bool rows, int stride, Image<float>& image) {
     }
     for (int i = 0; i < count; ++i) {
       float sum = 0.0F;
-      for (int k = i - kAround * stride; k <= i + kAround * stride; k += stride) {
+      for (int k = i - kSamplesAround * stride; k <= i + kSamplesAround * stride; k += stride) {
         sum += k >= 0 && k < count ? copy[static_cast<size_t>(k)] : 0.0F;
       }
       at(line, i) = sum;

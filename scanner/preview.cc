@@ -17,8 +17,8 @@
 namespace sateen {
 namespace {
 
-constexpr double kPeak = 0.8;
-constexpr int kMostTests = 8;
+constexpr double kPreviewPeak = 0.8;
+constexpr int kMostPreviewTests = 8;
 constexpr std::array<uint8_t, 3> kSaturatedInk = {255, 0, 255};
 
 // The light that is asked for, as the board switches it.
@@ -53,14 +53,13 @@ struct Cell {
 Cell CellOf(const RawMosaic& mosaic, const SensorReading& reading, int x, int y) {
   Cell cell;
   std::array<float, 3> sites = {};
-  for (int dy = 0; dy < 2; ++dy) {
-    for (int dx = 0; dx < 2; ++dx) {
-      const size_t colour = mosaic.cfa[static_cast<size_t>(2 * dy + dx)];
-      const float value = mosaic.samples.At(x + dx, y + dy);
-      cell.rgb[colour] += reading.Value(value, colour);
-      sites[colour] += 1.0F;
-      cell.saturated = cell.saturated || value >= reading.saturation;
-    }
+  for (size_t site = 0; site < mosaic.cfa.size(); ++site) {
+    const size_t colour = mosaic.cfa[site];
+    const float value =
+        mosaic.samples.At(x + static_cast<int>(site % 2), y + static_cast<int>(site / 2));
+    cell.rgb[colour] += reading.Value(value, colour);
+    sites[colour] += 1.0F;
+    cell.saturated = cell.saturated || value >= reading.saturation;
   }
   for (size_t c = 0; c < 3; ++c) {
     cell.rgb[c] /= sites[c];
@@ -136,8 +135,9 @@ class PreviewShooter {
   Result<Shot> Find(const std::filesystem::path& folder) {
     const double longest_s = light_ != nullptr ? LongestExposure(board_.Info(), *light_, {}) : 10.0;
     Result<ExposureSearch> search = ExposureSearch::Begin(
-        camera_.ExposureTimes(), {.peak = kPeak, .low = 0.0, .most = 1, .longest_s = longest_s});
-    for (int test = 0; search && test < kMostTests; ++test) {
+        camera_.ExposureTimes(),
+        {.peak = kPreviewPeak, .low = 0.0, .most = 1, .longest_s = longest_s});
+    for (int test = 0; search && test < kMostPreviewTests; ++test) {
       const double time_s = search->Found() ? search->Exposures()[0] : search->TestTime();
       Result<Shot> shot = Take(time_s, folder);
       if (!shot || search->Found()) {
@@ -149,7 +149,7 @@ class PreviewShooter {
       }
     }
     return search ? Fail(ErrorCode::kDevice, "no exposure found in {} test frames; give one",
-                         kMostTests)
+                         kMostPreviewTests)
                   : Result<Shot>(tl::unexpected(search.error()));
   }
 

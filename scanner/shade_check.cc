@@ -183,8 +183,9 @@ class ShadeFinder {
   // From -1 to 1 over the picture.
   [[nodiscard]] Eigen::Vector2d PlaceOf(size_t b) const {
     const auto columns = static_cast<size_t>(in_.grid.columns);
+    const size_t row = b / columns;
     return {2.0 * (static_cast<double>(b % columns) + 0.5) / in_.grid.columns - 1.0,
-            2.0 * (static_cast<double>(b / columns) + 0.5) / in_.grid.rows - 1.0};
+            2.0 * (static_cast<double>(row) + 0.5) / in_.grid.rows - 1.0};
   }
 
   // z of (2) below its upper quarter.
@@ -270,10 +271,18 @@ class ShadeFinder {
           members[root] += members[of_other];
         }
       };
-      if (b % columns > 0) join(b - 1);
-      if (b % columns + 1 < columns) join(b + 1);
-      if (b >= columns) join(b - columns);
-      if (b + columns < blocks_) join(b + columns);
+      if (b % columns > 0) {
+        join(b - 1);
+      }
+      if (b % columns + 1 < columns) {
+        join(b + 1);
+      }
+      if (b >= columns) {
+        join(b - columns);
+      }
+      if (b + columns < blocks_) {
+        join(b + columns);
+      }
       if (members[RootOf(parent, b)] >= kFewest) {
         return depth[b];
       }
