@@ -33,10 +33,6 @@ Eigen::Vector3d VectorAt(const Image3& image, size_t p) {
           static_cast<double>(image[2].pixels[p])};
 }
 
-bool IsSolved(const NormalField& field, size_t p) {
-  return field.reason.pixels[p] == static_cast<uint8_t>(Reason::kSolved);
-}
-
 // Linear interpolation between order statistics; `sorted` is not empty.
 double Quantile(const std::vector<double>& sorted, double q) {
   const double place = q * static_cast<double>(sorted.size() - 1);

@@ -69,10 +69,6 @@ double NormalQuantile(double share) {
   return z + (beyond - (1.0 - share)) / density;
 }
 
-bool IsSolved(const NormalField& field, size_t pixel) {
-  return field.reason.pixels[pixel] == static_cast<uint8_t>(Reason::kSolved);
-}
-
 // Solved pixels at equal distances in their own order: what is looked at depends neither on the
 // threads nor on how much of the image the mask leaves out.
 std::vector<size_t> PixelsLookedAt(const NormalField& field) {

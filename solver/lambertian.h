@@ -108,6 +108,10 @@ struct NormalField {
   void Resize(ImageSize size);
 };
 
+[[nodiscard]] inline bool IsSolved(const NormalField& field, size_t pixel) {
+  return field.reason.pixels[pixel] == static_cast<uint8_t>(Reason::kSolved);
+}
+
 /// Surface normal and albedo per pixel, from K frames under K known lights.
 ///
 ///     i_kc = rho_c e_kc(x) max(0, n . l_k(x)),            k = 1..K, c = red, green, blue     (1)

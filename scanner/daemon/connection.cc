@@ -20,7 +20,7 @@ using std::chrono::milliseconds;
 using std::chrono::steady_clock;
 
 // How much, and for how long, is read of a client that is being refused.
-constexpr std::size_t kDrainBytes = 1024 * 1024;
+constexpr std::size_t kDrainBytes = 1'048'576;
 constexpr milliseconds kDrainTime{500};
 
 std::string UserName(uid_t uid) {

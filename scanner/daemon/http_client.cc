@@ -191,7 +191,7 @@ Result<std::string> DaemonClient::Ask(const std::string& method, const std::stri
 Result<std::string> DaemonClient::RunJob(const std::string& path, const std::string& body,
                                          const std::function<void(const JobEvent&)>& observer,
                                          const Task& task) const {
-  const Result<std::string> posted = Ask("POST", path, body);
+  Result<std::string> posted = Ask("POST", path, body);
   if (!posted) {
     return posted;
   }
