@@ -146,7 +146,7 @@ Status Run(const LightArgs& args, std::optional<int> channel, const LightRig& ri
     return ShowBoard(args, channel, rig, out);
   }
   if (args.what == "off") {
-    const Status off = rig.all_off();
+    Status off = rig.all_off();
     if (off) {
       out << "all lights off\n";
     }

@@ -18,9 +18,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kPanelPx = 320;
-constexpr int kColumns = 5;
-constexpr double kHeatTop = 0.99;  // of the values; above is white
+constexpr int kOverviewPanelPx = 320;
+constexpr int kOverviewColumns = 5;
+constexpr double kOverviewHeatTop = 0.99;  // of the values; above is white
 
 std::string CaptionOf(const SessionFrame& frame) {
   std::string caption = frame.role == FrameRole::kDark ? "dark" : frame.light;
@@ -30,9 +30,9 @@ std::string CaptionOf(const SessionFrame& frame) {
   return frame.exposure_s ? caption + ", " + ExposureText(*frame.exposure_s) : caption;
 }
 
-// Means of factor x factor pixels, so that it is at most kPanelPx wide.
+// Means of factor x factor pixels, so that it is at most kOverviewPanelPx wide.
 Image3 SmallOf(const Image3& image) {
-  const int factor = (image[0].width + kPanelPx - 1) / kPanelPx;
+  const int factor = (image[0].width + kOverviewPanelPx - 1) / kOverviewPanelPx;
   Image3 small({image[0].width / factor, std::max(1, image[0].height / factor)});
   const float share = 1.0F / static_cast<float>(factor * factor);
   for (size_t c = 0; c < 3; ++c) {
@@ -85,8 +85,9 @@ Result<std::vector<Rgb8>> FramePanels(const fs::path& dir, const Session& sessio
 // An error or a residual as heat.
 Rgb8 HeatOf(const Image<float>& values) {
   std::vector<float> sorted = values.pixels;
-  const auto place = sorted.begin() +
-                     static_cast<std::ptrdiff_t>(kHeatTop * static_cast<double>(sorted.size() - 1));
+  const auto place =
+      sorted.begin() +
+      static_cast<std::ptrdiff_t>(kOverviewHeatTop * static_cast<double>(sorted.size() - 1));
   std::nth_element(sorted.begin(), place, sorted.end());
   return ShowHeat(values, std::max(*place, 1e-6F), Image<uint8_t>(values.width, values.height, 1));
 }
@@ -95,7 +96,7 @@ Result<std::vector<Rgb8>> MapPanels(const fs::path& maps) {
   std::vector<Rgb8> panels;
   const auto add = [&](const char* file, const char* caption, const auto& show) -> Status {
     return ReadImage3(maps / file).map([&](const Image3& map) {
-      panels.push_back(Captioned(Shrunk(show(map), kPanelPx), caption));
+      panels.push_back(Captioned(Shrunk(show(map), kOverviewPanelPx), caption));
     });
   };
   Status status =
@@ -108,7 +109,7 @@ Result<std::vector<Rgb8>> MapPanels(const fs::path& maps) {
     std::error_code ignored;
     if (status && fs::exists(maps / file, ignored)) {
       status = ReadPhoto(maps / file).map([&, caption = caption](const Photo& map) {
-        panels.push_back(Captioned(Shrunk(HeatOf(map.rgb[0]), kPanelPx), caption));
+        panels.push_back(Captioned(Shrunk(HeatOf(map.rgb[0]), kOverviewPanelPx), caption));
       });
     }
   }
@@ -123,7 +124,7 @@ Status WriteOverview(const SessionOverviewArgs& args, const Task& task) {
       rig ? FramePanels(args.session, *session, rig->response, task) : tl::unexpected(rig.error());
   if (panels && !args.maps.empty()) {
     // Maps begin a row of their own.
-    while (panels->size() % kColumns != 0) {
+    while (panels->size() % kOverviewColumns != 0) {
       Rgb8 empty = panels->back();
       for (Image<uint8_t>& plane : empty) {
         std::ranges::fill(plane.pixels, uint8_t{255});
@@ -151,7 +152,8 @@ Status WriteOverview(const SessionOverviewArgs& args, const Task& task) {
   if (!folder) {
     return tl::unexpected(folder.error());
   }
-  return WritePng8(folder->Stage(args.output.filename().string()), ContactSheet(*panels, kColumns))
+  return WritePng8(folder->Stage(args.output.filename().string()),
+                   ContactSheet(*panels, kOverviewColumns))
       .and_then([&] { return folder->Commit(); });
 }
 
