@@ -172,7 +172,10 @@ double NoiseScaleSquared(const LightStack& stack, const NormalField& field,
   }
   const Neighbours neighbours = LookAtNeighbours(stack, field, pixels);
   scale = std::max(std::min(scale, neighbours.scale_squared), neighbours.floor);
-  return scale > 0.0 ? scale : kNotKnown;
+  if (scale > 0.0) {
+    return scale;
+  }
+  return kNotKnown;
 }
 
 // What the second pass knows.
@@ -351,7 +354,7 @@ PieceSummary ClimbRows(const Climb& climb, const Image<float>& misfit, int begin
 Status DoubtLeastSquares(const Task& task, NormalField& field, PieceSummary& total) {
   const ImageSize size = field.reason.Size();
   std::vector<double> sums(static_cast<size_t>(size.height), 0.0);
-  const Status status = ParallelFor(
+  Status status = ParallelFor(
       size.height, RowsPerPiece(size), {.threads = task.threads, .cancel = task.cancel},
       [&](int begin, int end) {
         for (size_t p = field.model.Index(0, begin); p < field.model.Index(0, end); ++p) {
@@ -496,12 +499,12 @@ Status SolveLadderInto(const LightStack& stack, const Rig& rig, const std::optio
                                                                     static_cast<int>(usable) - 3));
   }
   for (size_t usable = 0; usable < 4; ++usable) {
-    climb.limit[usable] = INFINITY;
+    climb.limit[usable] = std::numeric_limits<float>::infinity();
   }
   field.summary.noise_scale =
       std::isfinite(climb.scale_squared) ? std::sqrt(climb.scale_squared) : 0.0;
   field.summary.noise_known = options.noise.has_value();
-  const Status status = ClimbAllRows(climb, misfit, task, field);
+  Status status = ClimbAllRows(climb, misfit, task, field);
   field.summary.seconds = SecondsSince(start);
   return status;
 }
