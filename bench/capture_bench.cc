@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdio>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <iostream>
@@ -306,7 +307,8 @@ void MeasureFaults(CaptureBench& bench, size_t stride) {
 
 // The other half of MeasureRepeats(), run under the rig: sessions in one process, one after the other.
 int RepeatHost(const fs::path& rig, const fs::path& out, int sessions) {
-  sateen::RigDevices devices({});
+  const char* camera = std::getenv("SATEEN_CAMERA");  // the virtual rig's
+  sateen::RigDevices devices({.camera = camera != nullptr ? camera : ""});
   for (int k = 0; k < sessions; ++k) {
     sateen::CaptureRequest request{.rig = rig, .output = out / "repeated"};
     request.options.exposure_s = 0.02;
