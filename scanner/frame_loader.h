@@ -33,7 +33,7 @@ struct LoadedFrames {
 /// of the shortest. A frame whose file has a shift_px is laid over the first (scanner/frame_shift.h).
 ///
 /// At least one light, each with at least one frame.
-/// Memory   K images, and for each thread five planes more, however many exposures there are
+/// Memory   K images, and for each thread some sixteen planes more, however many exposures there are
 ///
 /// Errors   kIo: a file is absent or unreadable
 ///          kBadData: a file is no image, has another hash than recorded, or another size than the
