@@ -120,6 +120,14 @@ class CaptureBench {
   [[nodiscard]] std::string Resume(const std::string& name) const {
     return fmt::format("'{}' capture --resume '{}' --deadline 6s", kSateen, Session(name).string());
   }
+  // Goes on with a session; begins anew only where the program says that nothing was captured yet.
+  [[nodiscard]] Outcome ResumeOrBegin(const std::string& name) const {
+    Outcome resumed = OnRig("", Resume(name));
+    if (resumed.status != 0 && resumed.text.find("nothing was captured") != std::string::npos) {
+      resumed = OnRig("", Capture(name, ""));
+    }
+    return resumed;
+  }
   [[nodiscard]] bool Verifies(const std::string& name) const {
     return Shell(fmt::format("'{}' session verify '{}'", kSateen, Session(name).string())).status ==
            0;
@@ -185,11 +193,7 @@ void MeasureKills(CaptureBench& bench, int kills) {
     killed += cut.status == 137 ? 1 : 0;
     const std::vector<json> events = EventsIn(bench.EventFile());
     longest_lit = std::max(longest_lit, AllOff(events) ? LitAfter(events, at_s) : 1e9);
-    // Killed before its journal had a line: begin anew, as the message says.
-    Outcome resumed = bench.OnRig("", bench.Resume("cut"));
-    if (resumed.status != 0) {
-      resumed = bench.OnRig("", bench.Capture("cut", ""));
-    }
+    const Outcome resumed = bench.ResumeOrBegin("cut");
     completed += resumed.status == 0 && bench.Verifies("cut") ? 1 : 0;
     same += bench.Same("cut", "whole") ? 1 : 0;
     if (resumed.status != 0) {
@@ -278,10 +282,7 @@ void MeasureFaults(CaptureBench& bench, size_t stride) {
     } else if ((run.status == 3 || run.status == 5) &&
                run.text.find("error: ") != std::string::npos) {
       ++stopped;
-      Outcome resumed = bench.OnRig("", bench.Resume("faulty"));
-      if (resumed.status != 0) {
-        resumed = bench.OnRig("", bench.Capture("faulty", ""));
-      }
+      const Outcome resumed = bench.ResumeOrBegin("faulty");
       if (resumed.status != 0) {
         wrong.push_back(what + ": does not resume: " + resumed.text);
       }
