@@ -13,22 +13,6 @@ namespace {
 
 constexpr int kPixelsPerPiece = 1 << 13;
 
-// Irradiance that the light's green flux gives at the table's origin, or phi itself.
-double TypicalIrradiance(const Light& light) {
-  const double distance_m =
-      light.model == LightModel::kDistant ? 1.0 : light.position_mm.norm() / 1000.0;
-  return light.flux_rgb.y() / (distance_m * distance_m);
-}
-
-// The power of two next to the lights' geometric mean: fluxes come in any unit.
-double FluxScale(const Lights& lights) {
-  double sum = 0.0;
-  for (const Light& light : lights) {
-    sum += std::log2(TypicalIrradiance(light));
-  }
-  return std::exp2(std::round(sum / static_cast<double>(lights.size())));
-}
-
 std::array<float, 3> Floats(const std::array<double, 3>& values) {
   return {static_cast<float>(values[0]), static_cast<float>(values[1]),
           static_cast<float>(values[2])};
@@ -56,6 +40,20 @@ KernelLight KernelLightOf(const Light& light, const LightFrame& frame, const Sam
 }
 
 }  // namespace
+
+double TypicalIrradiance(const Light& light) {
+  const double distance_m =
+      light.model == LightModel::kDistant ? 1.0 : light.position_mm.norm() / 1000.0;
+  return light.flux_rgb.y() / (distance_m * distance_m);
+}
+
+double FluxScale(const Lights& lights) {
+  double sum = 0.0;
+  for (const Light& light : lights) {
+    sum += std::log2(TypicalIrradiance(light));
+  }
+  return std::exp2(std::round(sum / static_cast<double>(lights.size())));
+}
 
 bool AllDistant(const Lights& lights) {
   return std::all_of(lights.begin(), lights.end(),

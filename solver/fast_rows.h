@@ -68,6 +68,11 @@ class FastRows {
 
 [[nodiscard]] bool AllDistant(const Lights& lights);
 
+// Irradiance that the light's green flux gives at the table's origin, or phi itself.
+[[nodiscard]] double TypicalIrradiance(const Light& light);
+// The power of two next to the lights' geometric mean of it: fluxes come in any unit.
+[[nodiscard]] double FluxScale(const Lights& lights);
+
 // Runs Touch over a whole image: what SolveLambertian would take if memory were the only cost.
 [[nodiscard]] Status TouchAllRows(const FastRows& rows, ImageSize size, const Task& task,
                                   NormalField& field);

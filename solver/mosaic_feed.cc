@@ -1,0 +1,291 @@
+#include "solver/mosaic_feed.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "solver/fast_rows.h"
+#include "solver/mosaic_site.h"
+
+namespace sateen {
+namespace {
+
+// Variance of a white diffuser's i' under light 0, so that float holds weights in any units.
+double NoiseUnit(const MosaicStack& stack, const Light& light, double flux_scale) {
+  const SiteNoise noise = NoiseAt(stack, 0, 0);
+  const double f = flux_scale / TypicalIrradiance(light);
+  const double unit = f * (noise.shot + f * noise.read_squared);
+  return unit > 0.0 ? unit : 1.0;
+}
+
+MosaicKernelLight KernelLightOf(const MosaicStack& stack, size_t k, const Light& light,
+                                double flux_scale, double noise_unit,
+                                const LambertianOptions& options) {
+  const bool is_distant = light.model == LightModel::kDistant;
+  const Eigen::Vector3f place = (is_distant ? light.direction : light.position_mm).cast<float>();
+  const Eigen::Vector3f axis = light.axis.cast<float>();
+  const MosaicFrame& frame = stack.lit[k];
+  MosaicKernelLight of{.model = light.model,
+                       .place = {place.x(), place.y(), place.z()},
+                       .axis = {axis.x(), axis.y(), axis.z()},
+                       .anisotropy = static_cast<float>(light.anisotropy),
+                       .per_dn = frame.per_dn,
+                       .at_zero = frame.at_zero,
+                       .clip_dn = ClipThreshold(frame, options),
+                       .dark = DarkThreshold(frame, options)};
+  for (size_t site = 0; site < 4; ++site) {
+    const double flux = light.flux_rgb[stack.cfa[site]] * (is_distant ? 1.0 : 1e6) / flux_scale;
+    of.inverse_flux[site] = static_cast<float>(1.0 / flux);
+    const SiteNoise noise = NoiseAt(stack, k, site);
+    of.shot[site] = static_cast<float>(noise.shot / noise_unit);
+    of.read_squared[site] = static_cast<float>(noise.read_squared / noise_unit);
+  }
+  return of;
+}
+
+// The search's light: its samples come with flux and saturation taken out of them.
+KernelLight ConsensusLightOf(const MosaicKernelLight& light) {
+  return {.model = light.model,
+          .place = light.place,
+          .axis = light.axis,
+          .anisotropy = light.anisotropy,
+          .inverse_flux = {1.0F, 1.0F, 1.0F},
+          .clip = std::numeric_limits<float>::infinity()};
+}
+
+}  // namespace
+
+void SiteRows::Resize(int first, ImageSize size, bool with_ladder) {
+  first_row = first;
+  field.Resize(size);
+  if (own_colour.Size() != size) {
+    own_colour = Image<float>(size);
+    misfit = with_ladder ? Image<float>(size) : Image<float>();
+    field.uncertainty = misfit;
+    field.model = with_ladder ? Image<uint8_t>(size) : Image<uint8_t>();
+  }
+}
+
+Result<MosaicFeed> MosaicFeed::Make(const MosaicStack& stack, const Rig& rig,
+                                    const LambertianOptions& options, bool weighted) {
+  MosaicFeed feed(stack);
+  if (!AllDistant(rig.lights)) {
+    Result<TableGrid> grid = TableGrid::Make(*rig.camera);
+    if (!grid) {
+      return tl::unexpected(grid.error());
+    }
+    feed.grid_ = *std::move(grid);
+  }
+  if (std::ranges::any_of(rig.lights, [](const Light& light) {
+        return light.model == LightModel::kLedField;
+      })) {
+    Result<GainRows> gains = GainRows::Make(*rig.camera, rig.lights);
+    if (!gains) {
+      return tl::unexpected(gains.error());
+    }
+    feed.gains_ = *std::move(gains);
+  }
+  const double flux_scale = FluxScale(rig.lights);
+  const double noise_unit = weighted ? NoiseUnit(stack, rig.lights[0], flux_scale) : 1.0;
+  feed.params_.result_scale = static_cast<float>(1.0 / flux_scale);
+  feed.params_.shadow_level = static_cast<float>(options.shadow_level);
+  feed.params_.max_condition_squared = std::min(
+      static_cast<float>(options.max_condition * options.max_condition), kFloatConditionSquared);
+  feed.params_.weighted = weighted;
+  feed.params_.noise_unit = static_cast<float>(noise_unit);
+  feed.consensus_.result_scale = feed.params_.result_scale;
+  feed.consensus_.shadow_level = feed.params_.shadow_level;
+  feed.consensus_.max_condition_squared = feed.params_.max_condition_squared;
+  for (size_t k = 0; k < rig.lights.size(); ++k) {
+    feed.params_.lights.push_back(
+        KernelLightOf(stack, k, rig.lights[k], flux_scale, noise_unit, options));
+    feed.consensus_.lights.push_back(ConsensusLightOf(feed.params_.lights.back()));
+  }
+  return feed;
+}
+
+MosaicPiece MosaicFeed::Read(int begin, int end) const {
+  MosaicPiece piece;
+  piece.begin_ = begin;
+  piece.end_ = end;
+  const size_t frames = stack_->lit.size();
+  piece.buffers_.resize(frames);
+  for (size_t k = 0; k < frames; ++k) {
+    const std::span<const uint16_t> rows = stack_->rows->Read(k, begin, end, piece.buffers_[k]);
+    piece.is_read_ = piece.is_read_ && !rows.empty();
+    piece.readings_.push_back(rows.data());
+  }
+  ReadDark(piece);
+  Locate(piece);
+  return piece;
+}
+
+void MosaicFeed::ReadDark(MosaicPiece& piece) const {
+  if (stack_->dark.empty()) {
+    return;
+  }
+  const auto width = static_cast<size_t>(stack_->size_px.width);
+  piece.dark_.assign(width * static_cast<size_t>(piece.end_ - piece.begin_), 0.0F);
+  std::vector<uint16_t> buffer;
+  for (size_t k = 0; k < stack_->dark.size(); ++k) {
+    const std::span<const uint16_t> rows =
+        stack_->rows->Read(stack_->lit.size() + k, piece.begin_, piece.end_, buffer);
+    if (rows.empty()) {
+      piece.is_read_ = false;
+      return;
+    }
+    const MosaicFrame& frame = stack_->dark[k];
+    const float weight = stack_->dark_weights[k];
+    for (int row = piece.begin_; row < piece.end_; ++row) {
+      const size_t start = width * static_cast<size_t>(row - piece.begin_);
+      const size_t above = static_cast<size_t>(row % 2) * 2;
+      for (size_t x = 0; x < width; ++x) {
+        const size_t site = above + x % 2;
+        piece.dark_[start + x] +=
+            weight * (frame.per_dn[site] * static_cast<float>(rows[start + x]) + frame.at_zero[site]);
+      }
+    }
+  }
+}
+
+// Table positions and gains, as far as the lights need them.
+void MosaicFeed::Locate(MosaicPiece& piece) const {
+  const auto width = static_cast<size_t>(stack_->size_px.width);
+  const size_t sites = width * static_cast<size_t>(piece.end_ - piece.begin_);
+  const auto each_row = [&](const auto& body) {
+    for (int row = piece.begin_; row < piece.end_; ++row) {
+      body(row, width * static_cast<size_t>(row - piece.begin_));
+    }
+  };
+  if (grid_) {
+    piece.x_mm_.resize(sites);
+    piece.y_mm_.resize(sites);
+    each_row([&](int row, size_t start) {
+      grid_->Row(row, std::span(piece.x_mm_).subspan(start, width),
+                 std::span(piece.y_mm_).subspan(start, width));
+    });
+  }
+  if (gains_) {
+    const size_t frames = stack_->lit.size();
+    piece.gains_.resize(sites * frames);
+    piece.gain_places_.assign(frames, nullptr);
+    for (size_t k = 0; k < frames; ++k) {
+      if (gains_->Has(k)) {
+        const std::span<float> of_light = std::span(piece.gains_).subspan(k * sites, sites);
+        each_row([&](int row, size_t start) {
+          gains_->Row(k, row, of_light.subspan(start, width));
+        });
+        piece.gain_places_[k] = of_light.data();
+      }
+    }
+  }
+}
+
+void MosaicFeed::Run(RowFunction function, const MosaicPiece& piece, const Mask* mask,
+                     SiteRows& rows) const {
+  const auto width = static_cast<size_t>(stack_->size_px.width);
+  std::vector<const uint16_t*> readings(piece.readings_.size());
+  std::vector<const float*> gains(piece.gain_places_.size());
+  for (int row = piece.begin_; row < piece.end_; ++row) {
+    const size_t start = width * static_cast<size_t>(row - piece.begin_);
+    const size_t to = rows.field.reason.Index(0, row - rows.first_row);
+    std::ranges::transform(piece.readings_, readings.begin(),
+                           [&](const uint16_t* frame) { return frame + start; });
+    std::ranges::transform(piece.gain_places_, gains.begin(), [&](const float* of_light) {
+      return of_light == nullptr ? nullptr : of_light + start;
+    });
+    const auto at = [&](auto& image) { return image.pixels.data() + to; };
+    const auto from = [&](const std::vector<float>& values) {
+      return values.empty() ? nullptr : values.data() + start;
+    };
+    function(params_,
+             {.readings = readings.data(),
+              .dark = from(piece.dark_),
+              .x_mm = from(piece.x_mm_),
+              .y_mm = from(piece.y_mm_),
+              .inverse_gains = gains.empty() ? nullptr : gains.data(),
+              .mask = mask == nullptr ? nullptr : mask->pixels.data() + mask->Index(0, row),
+              .row = row,
+              .count = width},
+             {.normal = {at(rows.field.normal[0]), at(rows.field.normal[1]),
+                         at(rows.field.normal[2])},
+              .albedo = at(rows.own_colour),
+              .residual = at(rows.field.residual),
+              .samples = at(rows.field.samples),
+              .reason = at(rows.field.reason),
+              .uncertainty = params_.weighted ? at(rows.field.uncertainty) : nullptr,
+              .misfit = params_.weighted ? at(rows.misfit) : nullptr});
+  }
+}
+
+void MosaicFeed::Solve(const MosaicPiece& piece, const Mask* mask, SiteRows& rows) const {
+  Run(SolveMosaicRow, piece, mask, rows);
+}
+
+void MosaicFeed::Touch(const MosaicPiece& piece, SiteRows& rows) const {
+  Run(TouchMosaicRow, piece, nullptr, rows);
+}
+
+void MosaicFeed::SolveConsensus(const MosaicPiece& piece, std::span<const size_t> sites,
+                                SiteRows& rows, std::span<uint8_t> agreeing) const {
+  const size_t count = sites.size();
+  const size_t frames = stack_->lit.size();
+  const auto width = static_cast<size_t>(stack_->size_px.width);
+  const size_t shift = width * static_cast<size_t>(piece.begin_ - rows.first_row);
+  // Side by side, so that every lane of a vector has work.
+  std::vector<float> gathered((2 * frames + 2) * count, 0.0F);
+  const auto column = [&](size_t index) { return gathered.data() + index * count; };
+  std::vector<const float*> planes;
+  std::vector<const float*> gains(frames, nullptr);
+  for (size_t k = 0; k < frames; ++k) {
+    const MosaicKernelLight& light = params_.lights[k];
+    for (size_t j = 0; j < count; ++j) {
+      const size_t at = sites[j] - shift;
+      const size_t row = static_cast<size_t>(piece.begin_) + at / width;
+      const size_t site = row % 2 * 2 + at % width % 2;
+      const auto reading = static_cast<float>(piece.readings_[k][at]);
+      const float radiance = light.per_dn[site] * reading + light.at_zero[site] - piece.Dark(at);
+      column(k)[j] = reading >= light.clip_dn ? std::numeric_limits<float>::quiet_NaN()
+                                              : radiance * light.inverse_flux[site];
+      if (!piece.gain_places_.empty() && piece.gain_places_[k] != nullptr) {
+        column(frames + k)[j] = piece.gain_places_[k][at];
+        gains[k] = column(frames + k);
+      }
+    }
+    planes.insert(planes.end(), 3, column(k));
+  }
+  for (size_t j = 0; j < count && grid_; ++j) {
+    column(2 * frames)[j] = piece.x_mm_[sites[j] - shift];
+    column(2 * frames + 1)[j] = piece.y_mm_[sites[j] - shift];
+  }
+  std::vector<float> results(8 * count);
+  std::vector<uint8_t> bytes(2 * count);
+  const auto result = [&](size_t index) { return results.data() + index * count; };
+  SolveConsensusSpan(consensus_,
+                     {.planes = planes.data(),
+                      .x_mm = column(2 * frames),
+                      .y_mm = column(2 * frames + 1),
+                      .inverse_gains = gains.data(),
+                      .count = count},
+                     {.normal = {result(0), result(1), result(2)},
+                      .albedo = {result(3), result(4), result(5)},
+                      .residual = result(6),
+                      .samples = bytes.data(),
+                      .reason = bytes.data() + count,
+                      .uncertainty = result(7),
+                      .agreeing = agreeing.data()});
+  for (size_t j = 0; j < count; ++j) {
+    if (bytes[count + j] != static_cast<uint8_t>(Reason::kSolved)) {
+      agreeing[j] = 0;
+      continue;
+    }
+    for (size_t c = 0; c < 3; ++c) {
+      rows.field.normal[c].pixels[sites[j]] = result(c)[j];
+    }
+    rows.own_colour.pixels[sites[j]] = result(3)[j];
+    rows.field.residual.pixels[sites[j]] = result(6)[j];
+    rows.field.uncertainty.pixels[sites[j]] = result(7)[j];
+  }
+}
+
+}  // namespace sateen

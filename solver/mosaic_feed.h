@@ -1,0 +1,84 @@
+#pragma once
+
+#include <atomic>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "core/error.h"
+#include "rig/table_grid.h"
+#include "solver/fast_kernel.h"
+#include "solver/gain_rows.h"
+#include "solver/lambertian.h"
+#include "solver/mosaic_kernel.h"
+#include "solver/mosaic_stack.h"
+
+namespace sateen {
+
+// Maps of some rows of a mosaic, before the albedo is interpolated.
+struct SiteRows {
+  int first_row = 0;
+  NormalField field;       // albedo is not filled
+  Image<float> own_colour;  // albedo of each site's colour
+  Image<float> misfit;
+
+  void Resize(int first, ImageSize size, bool with_ladder);
+};
+
+// What the kernels need of rows [begin, end): readings, dark frame and geometry.
+class MosaicPiece {
+ public:
+  [[nodiscard]] bool IsRead() const { return is_read_; }
+  [[nodiscard]] int Begin() const { return begin_; }
+  [[nodiscard]] int End() const { return end_; }
+  [[nodiscard]] uint16_t Reading(size_t frame, size_t site) const { return readings_[frame][site]; }
+  [[nodiscard]] float Dark(size_t site) const { return dark_.empty() ? 0.0F : dark_[site]; }
+
+ private:
+  friend class MosaicFeed;
+
+  bool is_read_ = true;
+  int begin_ = 0;
+  int end_ = 0;
+  std::vector<std::vector<uint16_t>> buffers_;
+  std::vector<const uint16_t*> readings_;  // of each lit frame
+  std::vector<float> dark_;
+  std::vector<float> x_mm_;
+  std::vector<float> y_mm_;
+  std::vector<float> gains_;
+  std::vector<const float*> gain_places_;
+};
+
+// Feeds rows of a mosaic stack, which it borrows and which must have been checked, to the kernels.
+class MosaicFeed {
+ public:
+  // kBadData where a near light needs table positions and a pixel does not see the table.
+  [[nodiscard]] static Result<MosaicFeed> Make(const MosaicStack& stack, const Rig& rig,
+                                               const LambertianOptions& options, bool weighted);
+
+  [[nodiscard]] MosaicPiece Read(int begin, int end) const;
+  // Into the rows of `rows` that are the piece's; `mask` of the whole image or null.
+  void Solve(const MosaicPiece& piece, const Mask* mask, SiteRows& rows) const;
+  // Rung 2 for the sites listed by their index in `rows`, as FastRows::SolveConsensus.
+  void SolveConsensus(const MosaicPiece& piece, std::span<const size_t> sites, SiteRows& rows,
+                      std::span<uint8_t> agreeing) const;
+  // Reads and writes the same bytes and only adds them up: the floor of Solve.
+  void Touch(const MosaicPiece& piece, SiteRows& rows) const;
+
+ private:
+  using RowFunction = void (*)(const MosaicKernelParams&, const MosaicKernelInput&,
+                               const MosaicKernelOutput&);
+
+  explicit MosaicFeed(const MosaicStack& stack) : stack_(&stack) {}
+  void ReadDark(MosaicPiece& piece) const;
+  void Locate(MosaicPiece& piece) const;
+  void Run(RowFunction function, const MosaicPiece& piece, const Mask* mask, SiteRows& rows) const;
+
+  const MosaicStack* stack_;
+  std::optional<TableGrid> grid_;  // absent where all lights are distant
+  std::optional<GainRows> gains_;  // absent where no light has a field
+  MosaicKernelParams params_;
+  KernelParams consensus_;
+};
+
+}  // namespace sateen
