@@ -12,7 +12,6 @@
 #include "core/parallel.h"
 #include "solver/consensus.h"
 #include "solver/fast_rows.h"
-#include "solver/mosaic_albedo.h"
 #include "solver/mosaic_feed.h"
 #include "solver/mosaic_site.h"
 
@@ -30,6 +29,15 @@ constexpr double kDoubtfulShare = 0.2;
 
 double SecondsFrom(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
+}
+
+void ResizeMaps(ImageSize size, bool with_ladder, NormalField& field) {
+  field.Resize(size);
+  const ImageSize ladder_size = with_ladder ? size : ImageSize{};
+  if (field.model.Size() != ladder_size) {
+    field.uncertainty = Image<float>(ladder_size);
+    field.model = Image<uint8_t>(ladder_size);
+  }
 }
 
 // One solve.
@@ -94,10 +102,10 @@ int64_t SolveInDouble(const MosaicJob& job, const MosaicPiece& piece, bool all, 
   const auto width = static_cast<size_t>(job.stack.size_px.width);
   std::vector<uint16_t> readings(job.stack.lit.size());
   int64_t solved = 0;
-  NormalField& field = rows.field;
+  NormalField& field = rows.Field();
   for (int row = piece.Begin(); row < piece.End(); ++row) {
     for (int column = 0; column < job.stack.size_px.width; ++column) {
-      const size_t p = field.reason.Index(column, row - rows.first_row);
+      const size_t p = rows.Index(row) + static_cast<size_t>(column);
       const bool inside = job.mask == nullptr || job.mask->At(column, row) != 0;
       if (!inside || !(all || field.reason.pixels[p] ==
                                   static_cast<uint8_t>(Reason::kIllConditioned))) {
@@ -115,13 +123,13 @@ int64_t SolveInDouble(const MosaicJob& job, const MosaicPiece& piece, bool all, 
         field.normal[c].pixels[p] =
             static_cast<float>(solution.n[static_cast<Eigen::Index>(c)] / length);
       }
-      rows.own_colour.pixels[p] = has_answer ? static_cast<float>(length) : 0.0F;
+      rows.OwnColour(p) = has_answer ? static_cast<float>(length) : 0.0F;
       field.residual.pixels[p] = static_cast<float>(solution.residual);
       field.samples.pixels[p] = static_cast<uint8_t>(std::min(solution.samples, 255));
       field.reason.pixels[p] = static_cast<uint8_t>(solution.reason);
       if (job.options.mode) {
         field.uncertainty.pixels[p] = static_cast<float>(std::min(solution.uncertainty_deg, 180.0));
-        rows.misfit.pixels[p] = static_cast<float>(solution.misfit);
+        rows.Misfit(p) = static_cast<float>(solution.misfit);
       }
       ++solved;
     }
@@ -129,17 +137,17 @@ int64_t SolveInDouble(const MosaicJob& job, const MosaicPiece& piece, bool all, 
   return solved;
 }
 
-bool MustClimb(const MosaicJob& job, const SiteRows& rows, size_t p) {
-  const uint8_t samples = rows.field.samples.pixels[p];
+bool MustClimb(const MosaicJob& job, SiteRows& rows, size_t p) {
+  const uint8_t samples = rows.Field().samples.pixels[p];
   if (samples <= 3 || *job.options.mode == LadderMode::kLeastSquares) {
     return false;
   }
   if (*job.options.mode == LadderMode::kConsensus) {
     return true;
   }
-  return rows.misfit.pixels[p] > job.limit[samples] &&
-         rows.field.residual.pixels[p] >
-             static_cast<float>(job.options.explained_residual) * rows.own_colour.pixels[p];
+  return rows.Misfit(p) > job.limit[samples] &&
+         rows.Field().residual.pixels[p] >
+             static_cast<float>(job.options.explained_residual) * rows.OwnColour(p);
 }
 
 Eigen::Vector3f SiteNormal(const NormalField& field, size_t p) {
@@ -151,20 +159,20 @@ void ClimbSites(const MosaicJob& job, const MosaicPiece& piece, std::span<const 
   std::vector<Eigen::Vector3f> before;
   before.reserve(sites.size());
   for (const size_t p : sites) {
-    before.push_back(SiteNormal(rows.field, p));
+    before.push_back(SiteNormal(rows.Field(), p));
   }
   std::vector<uint8_t> agreeing(sites.size());
   job.feed.SolveConsensus(piece, sites, rows, agreeing);
   for (size_t j = 0; j < sites.size(); ++j) {
     const bool is_explained = agreeing[j] >= kFewestAgreeing;
-    float& uncertainty = rows.field.uncertainty.pixels[sites[j]];
+    float& uncertainty = rows.Field().uncertainty.pixels[sites[j]];
     if (!is_explained) {
       uncertainty = std::min(180.0F, uncertainty * kUnexplainedFactor);
       ++totals.counts.unexplained;
     }
-    rows.field.model.pixels[sites[j]] =
+    rows.Field().model.pixels[sites[j]] =
         static_cast<uint8_t>(is_explained ? Rung::kConsensus : Rung::kUnexplained);
-    const Eigen::Vector3f after = SiteNormal(rows.field, sites[j]);
+    const Eigen::Vector3f after = SiteNormal(rows.Field(), sites[j]);
     totals.turned_deg += std::atan2(static_cast<double>(before[j].cross(after).norm()),
                                     static_cast<double>(before[j].dot(after))) *
                          kDegPerRad;
@@ -175,10 +183,10 @@ void ClimbSites(const MosaicJob& job, const MosaicPiece& piece, std::span<const 
 
 // Rung 1's word on the piece's sites, then rung 2's on those that climb.
 void Climb(const MosaicJob& job, const MosaicPiece& piece, SiteRows& rows, RowTotals& totals) {
-  NormalField& field = rows.field;
+  NormalField& field = rows.Field();
   std::vector<size_t> sites;
-  const size_t end = field.reason.Index(0, piece.End() - rows.first_row);
-  for (size_t p = field.reason.Index(0, piece.Begin() - rows.first_row); p < end; ++p) {
+  const size_t end = rows.Index(piece.End());
+  for (size_t p = rows.Index(piece.Begin()); p < end; ++p) {
     if (!IsSolved(field, p)) {
       field.model.pixels[p] = static_cast<uint8_t>(Rung::kNone);
       field.uncertainty.pixels[p] = 0.0F;
@@ -204,10 +212,10 @@ void Climb(const MosaicJob& job, const MosaicPiece& piece, SiteRows& rows, RowTo
 }
 
 void CountSites(const MosaicPiece& piece, const SiteRows& rows, SolveSummary& counts) {
-  const size_t end = rows.field.reason.Index(0, piece.End() - rows.first_row);
+  const size_t end = rows.Index(piece.End());
   std::array<int64_t, 256> of = {};
-  for (size_t p = rows.field.reason.Index(0, piece.Begin() - rows.first_row); p < end; ++p) {
-    ++of[rows.field.reason.pixels[p]];
+  for (size_t p = rows.Index(piece.Begin()); p < end; ++p) {
+    ++of[rows.Field().reason.pixels[p]];
   }
   const auto count = [&](Reason reason) { return of[static_cast<size_t>(reason)]; };
   counts.solved += count(Reason::kSolved);
@@ -276,6 +284,19 @@ Status SolveRowsOfMosaic(const MosaicJob& job, int begin, int end, const Task& t
   return status && !is_read ? CannotRead(job.stack) : status;
 }
 
+// A row by itself: totals, and the albedo of its sites' own colours. False where it cannot be read.
+bool SolveRowAlone(const MosaicJob& job, int row, RowTotals& totals, std::vector<float>& own) {
+  NormalField field;
+  SiteRows rows;
+  ResizeMaps({job.stack.size_px.width, 1}, job.options.mode.has_value(), field);
+  rows.Begin(row, row + 1, field, row, job.options.mode.has_value());
+  if (!SolvePiece(job, row, row + 1, rows, totals)) {
+    return false;
+  }
+  own.assign(&rows.OwnColour(0), &rows.OwnColour(0) + job.stack.size_px.width);
+  return true;
+}
+
 // Whether so many of some rows climb that rung 1 is to be doubted in what noise hides.
 Result<bool> ShouldDoubt(const MosaicJob& job, const Task& task) {
   const int height = job.stack.size_px.height;
@@ -285,18 +306,17 @@ Result<bool> ShouldDoubt(const MosaicJob& job, const Task& task) {
   const Task silent{.threads = task.threads, .progress = nullptr, .cancel = task.cancel};
   const Status status = ParallelFor(probes, 1, silent, [&](int probe, int) {
     const auto row = static_cast<int>((static_cast<int64_t>(probe) * 2 + 1) * height / (2 * probes));
-    SiteRows rows;
-    rows.Resize(row, {job.stack.size_px.width, 1}, true);
-    if (!SolvePiece(job, row, row + 1, rows, pieces[static_cast<size_t>(probe)])) {
+    std::vector<float> own;
+    if (!SolveRowAlone(job, row, pieces[static_cast<size_t>(probe)], own)) {
       is_read = false;
     }
   });
+  if (!status || !is_read) {
+    return tl::unexpected(status ? CannotRead(job.stack).error() : status.error());
+  }
   RowTotals total;
   for (const RowTotals& piece : pieces) {
     AddTotals(piece, total);
-  }
-  if (!status || !is_read) {
-    return tl::unexpected(status ? CannotRead(job.stack).error() : status.error());
   }
   return static_cast<double>(total.counts.robust.pixels) >
          kDoubtfulShare * static_cast<double>(total.counts.solved);
@@ -326,45 +346,100 @@ SolveSummary SummaryOf(const RowTotals& total, const MosaicOptions& options, con
   return summary;
 }
 
-// The rows above and below a band, whose albedo its own outermost rows are interpolated from.
-struct Halo {
-  std::vector<float> above;
-  std::vector<float> below;
+// One band after the other into maps, their own or those of the whole image.
+class BandSolver {
+ public:
+  BandSolver(const MosaicJob& job, const Task& task) : job_(job), task_(task) {}
+
+  // Rows [begin, end), which follow those of the call before; row 0 of `field` is `field_row`.
+  Status Solve(int begin, int end, NormalField& field, int field_row) {
+    rows_.Begin(begin, end, field, field_row, job_.options.mode.has_value());
+    RowTotals ignored;
+    below_.clear();
+    const Status status = SolveRowsOfMosaic(job_, begin, end, task_, rows_, total_);
+    if (status && end < job_.stack.size_px.height && !SolveRowAlone(job_, end, ignored, below_)) {
+      return CannotRead(job_.stack);
+    }
+    return status.and_then([&] { return InterpolateAlbedo(begin, end); });
+  }
+  [[nodiscard]] const RowTotals& Total() const { return total_; }
+
+ private:
+  Status InterpolateAlbedo(int begin, int end) {
+    const auto width = static_cast<size_t>(job_.stack.size_px.width);
+    const auto own = [&](int row) -> const float* {
+      const std::vector<float>& beyond = row < begin ? above_ : below_;
+      if (row < begin || row >= end) {
+        return beyond.empty() ? nullptr : beyond.data();
+      }
+      return &rows_.OwnColour(rows_.Index(row));
+    };
+    NormalField& field = rows_.Field();
+    const Task silent{.threads = task_.threads, .progress = nullptr, .cancel = task_.cancel};
+    const Status status = ParallelFor(
+        end - begin, RowsPerPiece(job_.stack.size_px), silent, [&](int from, int to) {
+          for (int row = begin + from; row < begin + to; ++row) {
+            const size_t at = rows_.Index(row);
+            InterpolateAlbedoRow(job_.stack.cfa, row, {own(row - 1), own(row), own(row + 1)}, width,
+                                 {&field.albedo[0].pixels[at], &field.albedo[1].pixels[at],
+                                  &field.albedo[2].pixels[at]});
+          }
+        });
+    above_.assign(own(end - 1), own(end - 1) + width);
+    return status;
+  }
+
+  const MosaicJob& job_;
+  const Task& task_;
+  SiteRows rows_;
+  RowTotals total_;
+  // Own colours just beyond the band; empty at the image's border.
+  std::vector<float> above_;
+  std::vector<float> below_;
 };
 
-Status SolveHalo(const MosaicJob& job, int row, std::vector<float>& own_colour) {
-  own_colour.clear();
-  if (row < 0 || row >= job.stack.size_px.height) {
-    return {};
-  }
-  SiteRows rows;
-  RowTotals ignored;
-  rows.Resize(row, {job.stack.size_px.width, 1}, job.options.mode.has_value());
-  if (!SolvePiece(job, row, row + 1, rows, ignored)) {
-    return CannotRead(job.stack);
-  }
-  own_colour = std::move(rows.own_colour.pixels);
-  return {};
-}
+// What every solve begins with.
+struct Prepared {
+  MosaicFeed feed;
+  std::array<float, 256> limit = {};
+  bool doubt = false;
+};
 
-Status SolveBand(const MosaicJob& job, int begin, int end, const Task& task, SiteRows& rows,
-                 RowTotals& total) {
-  rows.Resize(begin, {job.stack.size_px.width, end - begin}, job.options.mode.has_value());
-  Halo halo;
-  const Status status =
-      SolveRowsOfMosaic(job, begin, end, task, rows, total)
-          .and_then([&] { return SolveHalo(job, begin - 1, halo.above); })
-          .and_then([&] { return SolveHalo(job, end, halo.below); });
-  return status ? InterpolateAlbedo(job.stack.cfa, begin, rows.own_colour,
-                                    {halo.above, halo.below}, task, rows.field)
-                : status;
+Result<Prepared> Prepare(const MosaicStack& stack, const Rig& rig, const std::optional<Mask>& mask,
+                         const MosaicOptions& options, const Task& task) {
+  if (const Status status =
+          options.Validate().and_then([&] { return CheckMosaics(stack, rig, mask, options); });
+      !status) {
+    return tl::unexpected(status.error());
+  }
+  Result<MosaicFeed> feed =
+      MosaicFeed::Make(stack, rig, options.least_squares, options.mode.has_value());
+  if (!feed) {
+    return tl::unexpected(feed.error());
+  }
+  Prepared prepared{*std::move(feed)};
+  prepared.limit.fill(std::numeric_limits<float>::infinity());
+  for (size_t usable = 4; usable < prepared.limit.size(); ++usable) {
+    prepared.limit[usable] = static_cast<float>(
+        ChiSquaredQuantile(1.0 - options.false_alarms, static_cast<int>(usable) - 3));
+  }
+  if (options.mode == LadderMode::kAuto) {
+    const Result<bool> doubt = ShouldDoubt(
+        {stack, rig, mask ? &*mask : nullptr, options, prepared.feed, prepared.limit}, task);
+    if (!doubt) {
+      return tl::unexpected(doubt.error());
+    }
+    prepared.doubt = *doubt;
+  }
+  task.BeginStage("solving", stack.size_px.height);
+  return prepared;
 }
 
 }  // namespace
 
 Status MosaicOptions::Validate() const {
-  if (band_rows != 0 && band_rows < 2) {
-    return Fail(ErrorCode::kInvalidArgument, "band_rows = {}; need 0 or at least 2", band_rows);
+  if (band_rows < 1) {
+    return Fail(ErrorCode::kInvalidArgument, "band_rows = {}; need at least 1", band_rows);
   }
   const LadderOptions ladder{.least_squares = least_squares,
                              .false_alarms = false_alarms,
@@ -377,71 +452,62 @@ Result<SolveSummary> SolveMosaicByBands(const MosaicStack& stack, const Rig& rig
                                         const MosaicOptions& options, const Task& task,
                                         const BandSink& sink) {
   const Clock::time_point start = Clock::now();
-  if (const Status status =
-          options.Validate().and_then([&] { return CheckMosaics(stack, rig, mask, options); });
-      !status) {
-    return tl::unexpected(status.error());
+  const Result<Prepared> prepared = Prepare(stack, rig, mask, options, task);
+  if (!prepared) {
+    return tl::unexpected(prepared.error());
   }
-  const Result<MosaicFeed> feed =
-      MosaicFeed::Make(stack, rig, options.least_squares, options.mode.has_value());
-  if (!feed) {
-    return tl::unexpected(feed.error());
-  }
-  MosaicJob job{stack, rig, mask ? &*mask : nullptr, options, *feed};
-  job.limit.fill(std::numeric_limits<float>::infinity());
-  for (size_t usable = 4; usable < job.limit.size(); ++usable) {
-    job.limit[usable] = static_cast<float>(
-        ChiSquaredQuantile(1.0 - options.false_alarms, static_cast<int>(usable) - 3));
-  }
-  if (options.mode == LadderMode::kAuto) {
-    const Result<bool> doubt = ShouldDoubt(job, task);
-    if (!doubt) {
-      return tl::unexpected(doubt.error());
-    }
-    job.doubt = *doubt;
-  }
+  const MosaicJob job{stack,          rig,            mask ? &*mask : nullptr, options, prepared->feed,
+                      prepared->limit, prepared->doubt};
   const int height = stack.size_px.height;
-  const int band = options.band_rows == 0 ? height : options.band_rows;
-  task.BeginStage("solving", height);
-  RowTotals total;
-  std::array<SiteRows, 2> rows;  // one is handed on while the other is solved
+  BandSolver solver(job, task);
+  std::array<NormalField, 2> maps;  // one is handed on while the other is solved
   std::future<Status> handed_on;
   Status status;
-  for (int begin = 0, k = 0; status && begin < height; begin += band, ++k) {
-    SiteRows& now = rows[static_cast<size_t>(k % 2)];
-    status = SolveBand(job, begin, std::min(begin + band, height), task, now, total);
+  for (int begin = 0, k = 0; status && begin < height; begin += options.band_rows, ++k) {
+    NormalField& field = maps[static_cast<size_t>(k % 2)];
+    const int end = std::min(begin + options.band_rows, height);
+    ResizeMaps({stack.size_px.width, end - begin}, options.mode.has_value(), field);
+    status = solver.Solve(begin, end, field, begin);
     const Status before = handed_on.valid() ? handed_on.get() : Status();
     status = before ? status : before;
     if (status) {
-      handed_on = std::async(std::launch::async,
-                             [&sink, &now, begin] { return sink(begin, now.field); });
+      handed_on =
+          std::async(std::launch::async, [&sink, &field, begin] { return sink(begin, field); });
     }
   }
   const Status last = handed_on.valid() ? handed_on.get() : Status();
   if (!status || !last) {
     return tl::unexpected(status ? last.error() : status.error());
   }
-  return SummaryOf(total, options, task, SecondsFrom(start));
+  return SummaryOf(solver.Total(), options, task, SecondsFrom(start));
+}
+
+Status SolveMosaicInto(const MosaicStack& stack, const Rig& rig, const std::optional<Mask>& mask,
+                       const MosaicOptions& options, const Task& task, NormalField& field) {
+  const Clock::time_point start = Clock::now();
+  const Result<Prepared> prepared = Prepare(stack, rig, mask, options, task);
+  if (!prepared) {
+    return tl::unexpected(prepared.error());
+  }
+  const MosaicJob job{stack,          rig,            mask ? &*mask : nullptr, options, prepared->feed,
+                      prepared->limit, prepared->doubt};
+  ResizeMaps(stack.size_px, options.mode.has_value(), field);
+  BandSolver solver(job, task);
+  Status status;
+  for (int begin = 0; status && begin < stack.size_px.height; begin += options.band_rows) {
+    status = solver.Solve(begin, std::min(begin + options.band_rows, stack.size_px.height), field, 0);
+  }
+  field.summary = SummaryOf(solver.Total(), options, task, SecondsFrom(start));
+  return status;
 }
 
 Result<NormalField> SolveMosaic(const MosaicStack& stack, const Rig& rig,
                                 const std::optional<Mask>& mask, const MosaicOptions& options,
                                 const Task& task) {
-  if (const Status valid = options.Validate(); !valid) {
-    return tl::unexpected(valid.error());
-  }
-  MosaicOptions whole = options;
-  whole.band_rows = 0;
   NormalField field;
-  return SolveMosaicByBands(stack, rig, mask, whole, task,
-                            [&](int /*first_row*/, NormalField& band) {
-                              field = std::move(band);
-                              return Status();
-                            })
-      .map([&](const SolveSummary& summary) {
-        field.summary = summary;
-        return std::move(field);
-      });
+  return SolveMosaicInto(stack, rig, mask, options, task, field).map([&] {
+    return std::move(field);
+  });
 }
 
 }  // namespace sateen

@@ -21,8 +21,8 @@ struct MosaicOptions {
   // As in LadderOptions.
   double false_alarms = 1e-3;
   double explained_residual = 0.002;
-  // Rows that are solved, and handed on, together; 0: all. Least 2.
-  int band_rows = 0;
+  // Rows that are solved, and handed on, together; at least 1.
+  int band_rows = 256;
 
   // Names the first field out of range, with its value and its range.
   [[nodiscard]] Status Validate() const;
@@ -58,6 +58,11 @@ using BandSink = std::function<Status(int first_row, NormalField& band)>;
                                               const std::optional<Mask>& mask,
                                               const MosaicOptions& options = {},
                                               const Task& task = {});
+
+// The same into a field that may hold an earlier result, as SolveLambertianInto.
+[[nodiscard]] Status SolveMosaicInto(const MosaicStack& stack, const Rig& rig,
+                                     const std::optional<Mask>& mask, const MosaicOptions& options,
+                                     const Task& task, NormalField& field);
 
 // The same band by band, so that memory does not grow with the height. The sink runs beside the solve
 // of the next band. The summary is of the whole.

@@ -29,14 +29,14 @@ MosaicKernelLight KernelLightOf(const MosaicStack& stack, size_t k, const Light&
                        .place = {place.x(), place.y(), place.z()},
                        .axis = {axis.x(), axis.y(), axis.z()},
                        .anisotropy = static_cast<float>(light.anisotropy),
-                       .per_dn = frame.per_dn,
-                       .at_zero = frame.at_zero,
-                       .clip_dn = ClipThreshold(frame, options),
-                       .dark = DarkThreshold(frame, options)};
+                       .clip_dn = ClipThreshold(frame, options)};
   for (size_t site = 0; site < 4; ++site) {
     const double flux = light.flux_rgb[stack.cfa[site]] * (is_distant ? 1.0 : 1e6) / flux_scale;
-    of.inverse_flux[site] = static_cast<float>(1.0 / flux);
     const SiteNoise noise = NoiseAt(stack, k, site);
+    of.inverse_flux[site] = static_cast<float>(1.0 / flux);
+    of.per_dn[site] = static_cast<float>(static_cast<double>(frame.per_dn[site]) / flux);
+    of.at_zero[site] = static_cast<float>(static_cast<double>(frame.at_zero[site]) / flux);
+    of.least[site] = static_cast<float>(static_cast<double>(DarkThreshold(frame, options)) / flux);
     of.shot[site] = static_cast<float>(noise.shot / noise_unit);
     of.read_squared[site] = static_cast<float>(noise.read_squared / noise_unit);
   }
@@ -55,15 +55,12 @@ KernelLight ConsensusLightOf(const MosaicKernelLight& light) {
 
 }  // namespace
 
-void SiteRows::Resize(int first, ImageSize size, bool with_ladder) {
-  first_row = first;
-  field.Resize(size);
-  if (own_colour.Size() != size) {
-    own_colour = Image<float>(size);
-    misfit = with_ladder ? Image<float>(size) : Image<float>();
-    field.uncertainty = misfit;
-    field.model = with_ladder ? Image<uint8_t>(size) : Image<uint8_t>();
-  }
+void SiteRows::Begin(int begin, int end, NormalField& field, int field_row, bool with_ladder) {
+  field_ = &field;
+  field_row_ = field_row;
+  first_ = Index(begin);
+  own_colour_.resize(Index(end) - first_);
+  misfit_.resize(with_ladder ? own_colour_.size() : 0);
 }
 
 Result<MosaicFeed> MosaicFeed::Make(const MosaicStack& stack, const Rig& rig,
@@ -188,7 +185,8 @@ void MosaicFeed::Run(RowFunction function, const MosaicPiece& piece, const Mask*
   std::vector<const float*> gains(piece.gain_places_.size());
   for (int row = piece.begin_; row < piece.end_; ++row) {
     const size_t start = width * static_cast<size_t>(row - piece.begin_);
-    const size_t to = rows.field.reason.Index(0, row - rows.first_row);
+    const size_t to = rows.Index(row);
+    NormalField& field = rows.Field();
     std::ranges::transform(piece.readings_, readings.begin(),
                            [&](const uint16_t* frame) { return frame + start; });
     std::ranges::transform(piece.gain_places_, gains.begin(), [&](const float* of_light) {
@@ -207,14 +205,13 @@ void MosaicFeed::Run(RowFunction function, const MosaicPiece& piece, const Mask*
               .mask = mask == nullptr ? nullptr : mask->pixels.data() + mask->Index(0, row),
               .row = row,
               .count = width},
-             {.normal = {at(rows.field.normal[0]), at(rows.field.normal[1]),
-                         at(rows.field.normal[2])},
-              .albedo = at(rows.own_colour),
-              .residual = at(rows.field.residual),
-              .samples = at(rows.field.samples),
-              .reason = at(rows.field.reason),
-              .uncertainty = params_.weighted ? at(rows.field.uncertainty) : nullptr,
-              .misfit = params_.weighted ? at(rows.misfit) : nullptr});
+             {.normal = {at(field.normal[0]), at(field.normal[1]), at(field.normal[2])},
+              .albedo = &rows.OwnColour(to),
+              .residual = at(field.residual),
+              .samples = at(field.samples),
+              .reason = at(field.reason),
+              .uncertainty = params_.weighted ? at(field.uncertainty) : nullptr,
+              .misfit = params_.weighted ? &rows.Misfit(to) : nullptr});
   }
 }
 
@@ -231,7 +228,8 @@ void MosaicFeed::SolveConsensus(const MosaicPiece& piece, std::span<const size_t
   const size_t count = sites.size();
   const size_t frames = stack_->lit.size();
   const auto width = static_cast<size_t>(stack_->size_px.width);
-  const size_t shift = width * static_cast<size_t>(piece.begin_ - rows.first_row);
+  const size_t shift = rows.Index(piece.begin_);
+  NormalField& field = rows.Field();
   // Side by side, so that every lane of a vector has work.
   std::vector<float> gathered((2 * frames + 2) * count, 0.0F);
   const auto column = [&](size_t index) { return gathered.data() + index * count; };
@@ -244,9 +242,10 @@ void MosaicFeed::SolveConsensus(const MosaicPiece& piece, std::span<const size_t
       const size_t row = static_cast<size_t>(piece.begin_) + at / width;
       const size_t site = row % 2 * 2 + at % width % 2;
       const auto reading = static_cast<float>(piece.readings_[k][at]);
-      const float radiance = light.per_dn[site] * reading + light.at_zero[site] - piece.Dark(at);
-      column(k)[j] = reading >= light.clip_dn ? std::numeric_limits<float>::quiet_NaN()
-                                              : radiance * light.inverse_flux[site];
+      column(k)[j] = reading >= light.clip_dn
+                         ? std::numeric_limits<float>::quiet_NaN()
+                         : light.per_dn[site] * reading + light.at_zero[site] -
+                               light.inverse_flux[site] * piece.Dark(at);
       if (!piece.gain_places_.empty() && piece.gain_places_[k] != nullptr) {
         column(frames + k)[j] = piece.gain_places_[k][at];
         gains[k] = column(frames + k);
@@ -280,11 +279,11 @@ void MosaicFeed::SolveConsensus(const MosaicPiece& piece, std::span<const size_t
       continue;
     }
     for (size_t c = 0; c < 3; ++c) {
-      rows.field.normal[c].pixels[sites[j]] = result(c)[j];
+      field.normal[c].pixels[sites[j]] = result(c)[j];
     }
-    rows.own_colour.pixels[sites[j]] = result(3)[j];
-    rows.field.residual.pixels[sites[j]] = result(6)[j];
-    rows.field.uncertainty.pixels[sites[j]] = result(7)[j];
+    rows.OwnColour(sites[j]) = result(3)[j];
+    field.residual.pixels[sites[j]] = result(6)[j];
+    field.uncertainty.pixels[sites[j]] = result(7)[j];
   }
 }
 

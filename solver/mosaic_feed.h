@@ -15,14 +15,25 @@
 
 namespace sateen {
 
-// Maps of some rows of a mosaic, before the albedo is interpolated.
-struct SiteRows {
-  int first_row = 0;
-  NormalField field;       // albedo is not filled
-  Image<float> own_colour;  // albedo of each site's colour
-  Image<float> misfit;
+// Where the answers of some rows go: maps of these or more rows, and what only the solve itself needs.
+// Sites are named by their index in the maps.
+class SiteRows {
+ public:
+  // For rows [begin, end) of an image; row 0 of `field` is the image's `field_row`.
+  void Begin(int begin, int end, NormalField& field, int field_row, bool with_ladder);
 
-  void Resize(int first, ImageSize size, bool with_ladder);
+  [[nodiscard]] NormalField& Field() const { return *field_; }
+  [[nodiscard]] size_t Index(int row) const { return field_->reason.Index(0, row - field_row_); }
+  // Albedo of a site's own colour.
+  [[nodiscard]] float& OwnColour(size_t site) { return own_colour_[site - first_]; }
+  [[nodiscard]] float& Misfit(size_t site) { return misfit_[site - first_]; }
+
+ private:
+  NormalField* field_ = nullptr;
+  int field_row_ = 0;
+  size_t first_ = 0;  // site
+  std::vector<float> own_colour_;
+  std::vector<float> misfit_;
 };
 
 // What the kernels need of rows [begin, end): readings, dark frame and geometry.

@@ -8,6 +8,9 @@
 #include <hwy/contrib/math/math-inl.h>
 #include <hwy/highway.h>
 
+#include <algorithm>
+#include <vector>
+
 #include "core/check.h"
 #include "solver/fast_kernel_equations-inl.h"
 #include "solver/fast_kernel_vectors-inl.h"
@@ -44,20 +47,40 @@ HWY_INLINE V Inverse1(V v) {
 #endif
 }
 
-// The sites of a vector alternate between two places of the pattern.
-struct Sites {
-  size_t even = 0;
-  size_t odd = 0;
+// Vectors of a light's figures for the sites of a row, which alternate between two of the pattern.
+enum SiteFigure : size_t { kInverseFlux, kPerDn, kAtZero, kLeast, kShot, kReadSquared, kSiteFigures };
 
-  [[nodiscard]] HWY_INLINE V Of(const BySite& values) const {
-    const D d;
-    return hn::OddEven(hn::Set(d, values[odd]), hn::Set(d, values[even]));
+struct RowState {
+  hwy::AlignedFreeUniquePtr<float[]> scratch;
+  hwy::AlignedFreeUniquePtr<float[]> figures;  // [light][figure] for even, then for odd offsets
+
+  [[nodiscard]] HWY_INLINE const float* FiguresOf(size_t k, size_t lights, size_t offset) const {
+    return figures.get() + ((offset % 2) * lights + k) * kSiteFigures * hn::Lanes(D());
   }
 };
 
-HWY_INLINE Sites SitesOf(int row, size_t offset) {
-  const size_t above = static_cast<size_t>(row % 2) * 2;
-  return {above + offset % 2, above + 1 - offset % 2};
+RowState RowStateFor(const MosaicKernelParams& params, int row) {
+  const D d;
+  const size_t lanes = hn::Lanes(d);
+  const size_t lights = params.lights.size();
+  RowState state{hwy::AllocateAligned<float>(lights * kMosaicScratch * lanes),
+                 hwy::AllocateAligned<float>(2 * lights * kSiteFigures * lanes)};
+  float* to = state.figures.get();
+  for (size_t shift = 0; shift < 2; ++shift) {
+    for (const MosaicKernelLight& light : params.lights) {
+      for (const BySite* figure : {&light.inverse_flux, &light.per_dn, &light.at_zero, &light.least,
+                                   &light.shot, &light.read_squared}) {
+        for (size_t lane = 0; lane < lanes; ++lane) {
+          *to++ = (*figure)[static_cast<size_t>(row % 2) * 2 + (lane + shift) % 2];
+        }
+      }
+    }
+  }
+  return state;
+}
+
+HWY_INLINE V FigureOf(const float* figures, SiteFigure figure) {
+  return hn::Load(D(), figures + static_cast<size_t>(figure) * hn::Lanes(D()));
 }
 
 struct Arrival {
@@ -114,7 +137,7 @@ struct Readings {
 // Fills the scratch; i' is -1 where the reading is saturated.
 template <bool kDistant>
 HWY_INLINE Readings GatherReadings(const MosaicKernelParams& params, const MosaicKernelInput& input,
-                                   size_t offset, Sites sites, float* HWY_RESTRICT scratch) {
+                                   size_t offset, const RowState& state) {
   const D d;
   const size_t lanes = hn::Lanes(d);
   const V zero = hn::Zero(d);
@@ -124,21 +147,23 @@ HWY_INLINE Readings GatherReadings(const MosaicKernelParams& params, const Mosai
     const MosaicKernelLight& light = params.lights[k];
     const V reading = LoadReadings(input.readings[k] + offset);
     const M clipped = hn::Ge(reading, hn::Set(d, light.clip_dn));
-    const V radiance =
-        hn::Sub(hn::MulAdd(sites.Of(light.per_dn), reading, sites.Of(light.at_zero)), dark);
+    const float* figures = state.FiguresOf(k, params.lights.size(), offset);
+    const V inverse_flux = FigureOf(figures, kInverseFlux);
+    const V radiance = hn::NegMulAdd(
+        inverse_flux, dark,
+        hn::MulAdd(FigureOf(figures, kPerDn), reading, FigureOf(figures, kAtZero)));  // f i
     const Arrival in = ArrivalOf<kDistant>(light, input, k, offset);
-    const V factor = hn::Mul(sites.Of(light.inverse_flux), in.inverse_gain);
-    const V kept = hn::IfThenElse(clipped, hn::Set(d, -1.0F), hn::Mul(radiance, factor));
+    const V kept = hn::IfThenElse(clipped, hn::Set(d, -1.0F), hn::Mul(radiance, in.inverse_gain));
     readings.brightest = hn::Max(readings.brightest, kept);
     readings.saturated = hn::Add(readings.saturated, hn::IfThenElseZero(clipped, hn::Set(d, 1.0F)));
     readings.bright =
-        hn::Or(readings.bright, hn::Or(clipped, hn::Gt(radiance, hn::Set(d, light.dark))));
-    float* HWY_RESTRICT slot = scratch + k * kMosaicScratch * lanes;
+        hn::Or(readings.bright, hn::Or(clipped, hn::Gt(radiance, FigureOf(figures, kLeast))));
+    float* HWY_RESTRICT slot = state.scratch.get() + k * kMosaicScratch * lanes;
     hn::Store(in.l.x, d, slot);
     hn::Store(in.l.y, d, slot + lanes);
     hn::Store(in.l.z, d, slot + 2 * lanes);
     hn::Store(kept, d, slot + 3 * lanes);
-    hn::Store(factor, d, slot + 4 * lanes);
+    hn::Store(hn::Mul(inverse_flux, in.inverse_gain), d, slot + 4 * lanes);
   }
   return readings;
 }
@@ -211,8 +236,8 @@ HWY_INLINE void ResidualStep(const MosaicKernelParams& params, const float* scra
 }
 
 // Equations (2) and (3) of solver/mosaic.h.
-HWY_INLINE void WeightedSiteStep(const MosaicKernelParams& params, const float* scratch, V threshold,
-                                 Sites sites, SiteAnswer& answer) {
+HWY_INLINE void WeightedSiteStep(const MosaicKernelParams& params, const RowState& state,
+                                 size_t offset, V threshold, SiteAnswer& answer) {
   const D d;
   const size_t lanes = hn::Lanes(d);
   const V zero = hn::Zero(d);
@@ -222,14 +247,14 @@ HWY_INLINE void WeightedSiteStep(const MosaicKernelParams& params, const float* 
   Vector3 gradient{zero, zero, zero};
   V chi_squared = zero;
   for (size_t k = 0; k < params.lights.size(); ++k) {
-    const MosaicKernelLight& light = params.lights[k];
-    const float* slot = scratch + k * kMosaicScratch * lanes;
+    const float* figures = state.FiguresOf(k, params.lights.size(), offset);
+    const float* slot = state.scratch.get() + k * kMosaicScratch * lanes;
     const Usable u = UsableOf(slot, threshold);
     const V factor = hn::Load(d, slot + 4 * lanes);
     const V predicted = Dot(u.l, answer.n);
     const V variance = hn::Mul(
-        factor, hn::MulAdd(sites.Of(light.shot), hn::Max(predicted, least),
-                           hn::Mul(factor, sites.Of(light.read_squared))));
+        factor, hn::MulAdd(FigureOf(figures, kShot), hn::Max(predicted, least),
+                           hn::Mul(factor, FigureOf(figures, kReadSquared))));
     const V weight = hn::IfThenElseZero(
         u.is, Inverse1(hn::Clamp(variance, hn::Set(d, 1e-9F), hn::Set(d, 1e9F))));
     const V r = hn::Sub(u.i, predicted);
@@ -270,7 +295,7 @@ HWY_INLINE VI SiteReason(const Readings& readings, M enough, M accepted) {
 
 template <bool kDistant>
 HWY_INLINE void SolveSites(const MosaicKernelParams& params, const MosaicKernelInput& input,
-                           size_t offset, float* scratch, const MosaicKernelOutput& output) {
+                           size_t offset, const RowState& state, const MosaicKernelOutput& output) {
   const D d;
   const DI di;
   M inside = hn::Not(NoLanes());
@@ -279,13 +304,13 @@ HWY_INLINE void SolveSites(const MosaicKernelParams& params, const MosaicKernelI
     const VI mask = hn::PromoteTo(di, hn::LoadU(du8, input.mask + offset));
     inside = hn::RebindMask(d, hn::Ne(mask, hn::Zero(di)));
   }
-  const Sites sites = SitesOf(input.row, offset);
-  const Readings readings = GatherReadings<kDistant>(params, input, offset, sites, scratch);
+  const Readings readings = GatherReadings<kDistant>(params, input, offset, state);
+  const float* scratch = state.scratch.get();
   const V threshold = hn::Mul(readings.brightest, hn::Set(d, params.shadow_level));
   Inverse inverse;
   SiteAnswer answer = PlainLeastSquares(params, scratch, threshold, inverse);
   if (params.weighted) {
-    WeightedSiteStep(params, scratch, threshold, sites, answer);
+    WeightedSiteStep(params, state, offset, threshold, answer);
   } else {
     ResidualStep(params, scratch, threshold, inverse, answer);
   }
@@ -336,15 +361,90 @@ HWY_INLINE void ForEachVectorOfRow(size_t count, const Body& body) {
 void SolveMosaicRowImpl(const MosaicKernelParams& params, const MosaicKernelInput& input,
                         const MosaicKernelOutput& output) {
   const FlushSubnormals flush;
-  const auto scratch = hwy::AllocateAligned<float>(params.lights.size() * kMosaicScratch *
-                                                   hn::Lanes(D()));
+  const RowState state = RowStateFor(params, input.row);
   ForEachVectorOfRow(input.count, [&](size_t offset) HWY_ATTR {
     if (input.x_mm == nullptr) {
-      SolveSites<true>(params, input, offset, scratch.get(), output);
+      SolveSites<true>(params, input, offset, state, output);
     } else {
-      SolveSites<false>(params, input, offset, scratch.get(), output);
+      SolveSites<false>(params, input, offset, state, output);
     }
   });
+}
+
+// Neighbours in three rows: beside, above and below, at the corners.
+struct Around {
+  V beside, above, corners;
+};
+
+// Unsolved neighbours are zero. `count`: how many are not.
+HWY_INLINE Around SumAround(const float* a, const float* h, const float* b, bool count) {
+  const D d;
+  const auto load = [&](const float* from) HWY_ATTR {
+    const V value = hn::LoadU(d, from);
+    return count ? hn::IfThenElseZero(hn::Gt(value, hn::Zero(d)), hn::Set(d, 1.0F)) : value;
+  };
+  return {hn::Add(load(h - 1), load(h + 1)), hn::Add(load(a), load(b)),
+          hn::Add(hn::Add(load(a - 1), load(a + 1)), hn::Add(load(b - 1), load(b + 1)))};
+}
+
+// Which neighbours are of a colour, as 1 and 0, at the sites of a vector that begins at an even one.
+HWY_INLINE Around TakenFor(const std::array<uint8_t, 4>& cfa, int row, size_t colour) {
+  const D d;
+  const auto pattern = [&](size_t step) HWY_ATTR {
+    const auto is = [&](size_t x) {
+      return cfa[(static_cast<size_t>(row % 2) * 2 + x) ^ step] == colour ? 1.0F : 0.0F;
+    };
+    return hn::OddEven(hn::Set(d, is(1)), hn::Set(d, is(0)));
+  };
+  return {pattern(1), pattern(2), pattern(3)};
+}
+
+HWY_INLINE V Total(const Around& taken, const Around& of) {
+  return hn::MulAdd(taken.beside, of.beside,
+                    hn::MulAdd(taken.above, of.above, hn::Mul(taken.corners, of.corners)));
+}
+
+void InterpolateAlbedoRowImpl(const std::array<uint8_t, 4>& cfa, int row, const OwnColours& own,
+                              size_t width, const std::array<float*, 3>& albedo) {
+  const D d;
+  const size_t lanes = hn::Lanes(d);
+  // Each between zeros, with a whole vector of them at the end.
+  const size_t padded = (width + lanes - 1) / lanes * lanes + lanes + 1;
+  std::vector<float> rows(3 * padded + 3 * lanes, 0.0F);
+  const std::array<const float*, 3> from = {own.above, own.row, own.below};
+  for (size_t j = 0; j < 3; ++j) {
+    if (from[j] != nullptr) {
+      std::copy_n(from[j], width, rows.begin() + static_cast<std::ptrdiff_t>(j * padded + 1));
+    }
+  }
+  const float* const a = rows.data() + 1;
+  const float* const h = a + padded;
+  const float* const b = h + padded;
+  float* const spare = rows.data() + 3 * padded;
+  const V zero = hn::Zero(d);
+  for (size_t x = 0; x < width; x += lanes) {
+    const Around sums = SumAround(a + x, h + x, b + x, false);
+    const Around counts = SumAround(a + x, h + x, b + x, true);
+    const V here = hn::LoadU(d, h + x);
+    const bool whole = x + lanes <= width;
+    for (size_t c = 0; c < 3; ++c) {
+      const Around taken = TakenFor(cfa, row, c);
+      const auto is_own = [&](size_t place) {
+        return cfa[static_cast<size_t>(row % 2) * 2 + place] == c ? 1.0F : 0.0F;
+      };
+      const V count = Total(taken, counts);
+      const M is_mean = hn::And(
+          hn::Gt(count, zero),
+          hn::Eq(hn::OddEven(hn::Set(d, is_own(1)), hn::Set(d, is_own(0))), zero));
+      const V mean = hn::Div(Total(taken, sums), hn::Max(count, hn::Set(d, 1.0F)));
+      const V value =
+          hn::IfThenElseZero(hn::Gt(here, zero), hn::IfThenElse(is_mean, mean, here));
+      hn::StoreU(value, d, whole ? albedo[c] + x : spare + c * lanes);
+      if (!whole) {
+        std::copy_n(spare + c * lanes, width - x, albedo[c] + x);
+      }
+    }
+  }
 }
 
 void TouchMosaicRowImpl(const MosaicKernelParams& params, const MosaicKernelInput& input,
@@ -373,6 +473,7 @@ namespace sateen {
 
 HWY_EXPORT(SolveMosaicRowImpl);
 HWY_EXPORT(TouchMosaicRowImpl);
+HWY_EXPORT(InterpolateAlbedoRowImpl);
 
 void SolveMosaicRow(const MosaicKernelParams& params, const MosaicKernelInput& input,
                     const MosaicKernelOutput& output) {
@@ -382,6 +483,11 @@ void SolveMosaicRow(const MosaicKernelParams& params, const MosaicKernelInput& i
 void TouchMosaicRow(const MosaicKernelParams& params, const MosaicKernelInput& input,
                     const MosaicKernelOutput& output) {
   HWY_DYNAMIC_DISPATCH(TouchMosaicRowImpl)(params, input, output);
+}
+
+void InterpolateAlbedoRow(const std::array<uint8_t, 4>& cfa, int row, const OwnColours& own,
+                          size_t width, const std::array<float*, 3>& albedo) {
+  HWY_DYNAMIC_DISPATCH(InterpolateAlbedoRowImpl)(cfa, row, own, width, albedo);
 }
 
 }  // namespace sateen

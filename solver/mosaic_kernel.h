@@ -11,17 +11,18 @@
 namespace sateen {
 
 // One light as the mosaic kernel wants it, by the site of the 2x2 pattern where the colours differ.
+// f = 1 / phi of the site's colour, of distant lights; otherwise 1 / (phi 1e6 mm^2).
 struct MosaicKernelLight {
   LightModel model = LightModel::kDistant;
   std::array<float, 3> place = {};  // distant: l; otherwise position_mm
   std::array<float, 3> axis = {};
   float anisotropy = 0.0F;
-  BySite inverse_flux = {};  // distant: 1 / phi; otherwise 1 / (phi 1e6 mm^2)
-  BySite per_dn = {};        // radiance = per_dn reading + at_zero - dark
+  float clip_dn = 0.0F;      // a reading of this or more is saturated
+  BySite inverse_flux = {};  // f
+  BySite per_dn = {};        // f radiance = per_dn reading + at_zero - f dark
   BySite at_zero = {};
-  float clip_dn = 0.0F;  // a reading of this or more is saturated
-  float dark = 0.0F;     // radiance above is not dark
-  // Variance of radiance i, in units of MosaicKernelParams::noise_unit: shot i + read_squared.
+  BySite least = {};  // f radiance above is not dark
+  // Variance of f radiance = f (shot f radiance + f read_squared), in units of noise_unit.
   BySite shot = {};
   BySite read_squared = {};
 };
@@ -68,6 +69,19 @@ inline constexpr size_t kFewestSites = 64;
 /// Without weights one step of refinement, as in SolveSpan.
 void SolveMosaicRow(const MosaicKernelParams& params, const MosaicKernelInput& input,
                     const MosaicKernelOutput& output);
+
+// Albedo of each site's own colour in a row, and in those above and below; null beyond the border.
+struct OwnColours {
+  const float* above = nullptr;
+  const float* row = nullptr;
+  const float* below = nullptr;
+};
+
+// Albedo of all colours in row `row` of an image: the own colour as it is, another one as the mean of
+// the nearest solved sites of that colour among the eight neighbours, the own colour's value where
+// there is none. Zero where the site is not solved.
+void InterpolateAlbedoRow(const std::array<uint8_t, 4>& cfa, int row, const OwnColours& own,
+                          size_t width, const std::array<float*, 3>& albedo);
 
 // Reads the same readings and writes the same maps, nothing else.
 void TouchMosaicRow(const MosaicKernelParams& params, const MosaicKernelInput& input,
