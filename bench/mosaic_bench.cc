@@ -77,8 +77,8 @@ Scene MakeScene(sateen::ImageSize size) {
         const size_t x = p % static_cast<size_t>(size.width);
         const double signal =
             static_cast<double>(rgb[kRggb[y % 2 * 2 + x % 2]].pixels[p]) / scene.per_dn;
-        const double noise = std::sqrt(gain_dn * signal + read_dn * read_dn) *
-                             sateen::NormalDeviate(k, p);
+        const double noise =
+            std::sqrt(gain_dn * signal + read_dn * read_dn) * sateen::NormalDeviate(k, p);
         readings.pixels[p] = static_cast<uint16_t>(
             std::clamp(std::lround(kBlackDn + signal + noise), 0L, std::lround(kWhiteDn)));
       }
@@ -102,11 +102,10 @@ sateen::LightStack Demosaiced(const Scene& scene) {
       static_cast<int>(scene.readings.size()), 1, {}, [&](int begin, int /*end*/) {
         const auto k = static_cast<size_t>(begin);
         sateen::RawMosaic mosaic{.samples = Image<float>(scene.stack.size_px), .cfa = kRggb};
-        std::ranges::transform(scene.readings[k].pixels, mosaic.samples.pixels.begin(),
-                               [&](uint16_t reading) {
-                                 return static_cast<float>(
-                                     (static_cast<double>(reading) - kBlackDn) * scene.per_dn);
-                               });
+        std::ranges::transform(
+            scene.readings[k].pixels, mosaic.samples.pixels.begin(), [&](uint16_t reading) {
+              return static_cast<float>((static_cast<double>(reading) - kBlackDn) * scene.per_dn);
+            });
         stack[k] = {.rgb = sateen::Demosaic(mosaic),
                     .full_scale = static_cast<float>((kWhiteDn - kBlackDn) * scene.per_dn),
                     .raw = true};

@@ -8,9 +8,11 @@
 #include <utility>
 
 #include "cli/maps.h"
+#include "cli/mosaic_maps.h"
 #include "cli/solve_report.h"
 #include "core/output_folder.h"
 #include "solver/ladder.h"
+#include "solver/mosaic.h"
 #include "solver/undistort.h"
 
 namespace sateen::cli {
@@ -22,8 +24,24 @@ double SecondsSince(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
+// Mosaics have two backends; the others are there to be compared with.
+bool HasMosaics(const SolveArgs& args) {
+  const std::optional<Backend> backend = BackendNamed(args.backend);
+  return backend != Backend::kQr && backend != Backend::kLdlt;
+}
+
+Domain DomainNamed(const SolveArgs& args) {
+  if (args.domain == "raw") {
+    return Domain::kRaw;
+  }
+  return args.domain == "rgb" || !HasMosaics(args) ? Domain::kRgb : Domain::kAuto;
+}
+
 ReadCaptureOptions ReadOptionsOf(const SolveArgs& args) {
   ReadCaptureOptions options = args.read;
+  options.domain = DomainNamed(args);
+  options.by_noise = LadderModeNamed(args.robust).has_value();
+  options.scratch_dir = args.output;
   options.encoding = EncodingNamed(args.encoding);
   if (!args.rig_file.empty()) {
     options.rig_file = args.rig_file;
@@ -120,6 +138,12 @@ Status CheckSupported(const SolveArgs& args, Capture& capture) {
                 "or Normal_gt.mat, or --truth",
                 args.capture.string());
   }
+  if (args.domain == "raw" && !HasMosaics(args)) {
+    return Fail(ErrorCode::kInvalidArgument,
+                "--backend {} is for interpolated colours; use --domain rgb, or --backend auto, "
+                "fast or jacobi-svd",
+                args.backend);
+  }
   if (args.undistort && !capture.rig.camera) {
     return Fail(ErrorCode::kBadData,
                 "{}: --undistort needs the lens, and the rig has no camera; run sateen calibrate "
@@ -170,10 +194,12 @@ Status StageAll(const SolveArgs& args, const SolveOutcome& outcome,
                 const std::optional<Image<float>>& error_deg, const Task& task,
                 OutputFolder& folder) {
   const MapsOptions options{.normal_y_down = args.normal_y == "down"};
+  const LightFrame first = outcome.capture.mosaics ? ShowFrame(outcome.capture.mosaics->stack, 0)
+                                                   : outcome.capture.stack.front();
   if (!args.undistort) {
-    return StageMaps(outcome.field, outcome.capture.stack.front(), error_deg, options, folder);
+    return StageMaps(outcome.field, first, error_deg, options, folder);
   }
-  MapsToWrite maps{outcome.field, outcome.capture.stack.front(), error_deg};
+  MapsToWrite maps{outcome.field, first, error_deg};
   return UndistortMaps(*outcome.capture.rig.camera, task, maps).and_then([&] {
     return StageMaps(maps.field, maps.first_frame, maps.error_deg, options, folder);
   });
@@ -182,6 +208,10 @@ Status StageAll(const SolveArgs& args, const SolveOutcome& outcome,
 Result<NormalField> SolveStack(const SolveArgs& args, const LambertianOptions& least_squares,
                                const Capture& capture, const Task& task) {
   const std::optional<LadderMode> mode = LadderModeNamed(args.robust);
+  if (capture.mosaics) {
+    return SolveMosaic(capture.mosaics->stack, capture.rig, capture.mask,
+                       {.mode = mode, .least_squares = least_squares}, task);
+  }
   if (!mode) {
     return SolveLambertian(capture.stack, capture.rig, capture.mask, least_squares, task);
   }
@@ -191,6 +221,33 @@ Result<NormalField> SolveStack(const SolveArgs& args, const LambertianOptions& l
       task);
 }
 
+// Maps that need no other row of themselves than the one that is written.
+bool CanStream(const SolveArgs& args, const Capture& capture) {
+  return capture.mosaics && !capture.truth && !args.undistort;
+}
+
+Status SolveByBands(const SolveArgs& args, const LambertianOptions& least_squares, const Task& task,
+                    OutputFolder& folder, SolveOutcome& outcome) {
+  const Capture& capture = outcome.capture;
+  return SolveIntoMaps(capture.mosaics->stack, capture.rig, capture.mask,
+                       {.mode = LadderModeNamed(args.robust), .least_squares = least_squares},
+                       {.normal_y_down = args.normal_y == "down"}, task, folder)
+      .map([&](const SolveSummary& summary) { outcome.field.summary = summary; });
+}
+
+Status SolveWhole(const SolveArgs& args, const LambertianOptions& least_squares, const Task& task,
+                  OutputFolder& folder, SolveOutcome& outcome) {
+  Result<NormalField> field = SolveStack(args, least_squares, outcome.capture, task);
+  if (!field) {
+    return tl::unexpected(field.error());
+  }
+  outcome.field = std::move(*field);
+  std::optional<Image<float>> error_map_deg;
+  return Evaluate(outcome, error_map_deg).and_then([&] {
+    return StageAll(args, outcome, error_map_deg, task, folder);
+  });
+}
+
 // Reads, solves, compares and writes. Nothing is left behind where any of it fails.
 Result<SolveOutcome> SolveCapture(const SolveArgs& args, const Task& task, std::ostream& log) {
   const Clock::time_point start = Clock::now();
@@ -198,6 +255,11 @@ Result<SolveOutcome> SolveCapture(const SolveArgs& args, const Task& task, std::
   options.backend = *BackendNamed(args.backend);
   if (Status status = options.Validate(); !status) {
     return tl::unexpected(status.error());
+  }
+  // Before the work, so that a folder that cannot be written to is told at once.
+  Result<OutputFolder> folder = OutputFolder::Open(args.output);
+  if (!folder) {
+    return tl::unexpected(folder.error());
   }
   Result<Capture> capture = ReadCapture(args.capture, ReadOptionsOf(args), task);
   if (!capture) {
@@ -213,21 +275,9 @@ Result<SolveOutcome> SolveCapture(const SolveArgs& args, const Task& task, std::
   SolveOutcome outcome;
   outcome.capture = std::move(*capture);
   outcome.seconds_reading = SecondsSince(start);
-  // Before the work, so that a folder that cannot be written to is told at once.
-  Result<OutputFolder> folder = OutputFolder::Open(args.output);
-  if (!folder) {
-    return tl::unexpected(folder.error());
-  }
-  Result<NormalField> field = SolveStack(args, options, outcome.capture, task);
-  if (!field) {
-    return tl::unexpected(field.error());
-  }
-  outcome.field = std::move(*field);
-  std::optional<Image<float>> error_map_deg;
-  Status status = Evaluate(outcome, error_map_deg);
-  if (status) {
-    status = StageAll(args, outcome, error_map_deg, task, *folder);
-  }
+  Status status = CanStream(args, outcome.capture)
+                      ? SolveByBands(args, options, task, *folder, outcome)
+                      : SolveWhole(args, options, task, *folder, outcome);
   if (status) {
     status = task.CheckCancelled();
   }
@@ -290,6 +340,13 @@ void AddSolve(CLI::App& root, SolveArgs& args) {
          "lowest rung that explains it; least-squares, robust: that rung everywhere; none: "
          "least squares without weights and without uncertainty")
       ->check(CLI::IsMember({"auto", "least-squares", "robust", "none"}))
+      ->capture_default_str();
+  cmd->add_option(
+         "--domain", args.domain,
+         "What is solved. raw: each site of the mosaic from readings of its own colour; rgb: "
+         "colours interpolated at every pixel; auto: raw where all frames are camera RAW, one "
+         "exposure a light, not moved, and the rig knows the sensor's noise")
+      ->check(CLI::IsMember({"auto", "raw", "rgb"}))
       ->capture_default_str();
   cmd->add_option("--shadow-level", args.solver.shadow_level,
                   "Leave out samples at or below this fraction of the pixel's brightest [0, 1)")

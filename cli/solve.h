@@ -24,6 +24,7 @@ struct SolveArgs {
   std::string encoding = "auto";
   std::string backend = "auto";
   std::string robust = "auto";
+  std::string domain = "auto";
   std::string normal_y = "up";
   LambertianOptions solver;
   int threads = 0;
@@ -36,6 +37,7 @@ struct SolveArgs {
 // Everything that a report speaks of.
 struct SolveOutcome {
   Capture capture;
+  // Of captures that are solved band by band straight into maps the summary alone.
   NormalField field;
   std::optional<ErrorStatistics> angular_error_deg;
   std::optional<ErrorStatistics> low_frequency_error_deg;  // where the rig has a camera, too

@@ -16,6 +16,7 @@ nlohmann::json ToJson(const ErrorStatistics& error) {
 nlohmann::json OptionsToJson(const SolveArgs& args) {
   return {{"backend", args.backend},
           {"robust", args.robust},
+          {"domain", args.domain},
           {"lights", args.read.lights},
           {"shadow_level", args.solver.shadow_level},
           {"clip_level", args.solver.clip_level},
@@ -91,14 +92,15 @@ std::string BackendWords(const SolveSummary& summary) {
 
 std::string JsonReport(const SolveArgs& args, const SolveOutcome& outcome) {
   const SolveSummary& summary = outcome.field.summary;
-  const ImageSize size = outcome.field.normal.Size();
+  const ImageSize size = outcome.capture.Size();
   nlohmann::json report = {{"schema", "sateen.solve/1"},
                            {"version", SATEEN_VERSION},
                            {"capture", args.capture.string()},
                            {"layout", outcome.capture.layout},
                            {"output", args.output.string()},
+                           {"domain", outcome.capture.mosaics ? "raw" : "rgb"},
                            {"size_px", {size.width, size.height}},
-                           {"lights", outcome.capture.stack.size()},
+                           {"lights", outcome.capture.rig.lights.size()},
                            {"pixels", summary.pixels},
                            {"solved", summary.solved},
                            {"unsolved",
@@ -116,6 +118,9 @@ std::string JsonReport(const SolveArgs& args, const SolveOutcome& outcome) {
                            {"options", OptionsToJson(args)},
                            {"warnings", outcome.capture.warnings},
                            {"inputs", outcome.capture.sha256_of_input}};
+  if (!outcome.capture.why_no_mosaics.empty()) {
+    report["why_rgb"] = outcome.capture.why_no_mosaics;
+  }
   if (args.robust != "none") {
     report["ladder"] = LadderToJson(summary);
   }
@@ -144,11 +149,13 @@ std::string JsonReport(const SolveArgs& args, const SolveOutcome& outcome) {
 
 std::string TextReport(const SolveArgs& args, const SolveOutcome& outcome) {
   const SolveSummary& summary = outcome.field.summary;
-  const ImageSize size = outcome.field.normal.Size();
+  const ImageSize size = outcome.capture.Size();
   std::string text = fmt::format(
-      "solved {} of {} pixels ({}x{} px, {} lights) in {:.3f} s, {} thread{}, backend {}\n",
-      summary.solved, summary.pixels, size.width, size.height, outcome.capture.stack.size(),
-      summary.seconds, summary.threads, summary.threads == 1 ? "" : "s", BackendWords(summary));
+      "solved {} of {} pixels ({}x{} px, {} lights) in {:.3f} s, {} thread{}, backend {}, "
+      "from {}\n",
+      summary.solved, summary.pixels, size.width, size.height, outcome.capture.rig.lights.size(),
+      summary.seconds, summary.threads, summary.threads == 1 ? "" : "s", BackendWords(summary),
+      outcome.capture.mosaics ? "the mosaics" : "interpolated colours");
   if (const std::string words = UnsolvedWords(summary); !words.empty()) {
     text += fmt::format("unsolved: {} (see reason.png)\n", words);
   }

@@ -47,7 +47,7 @@ struct Photo {
 
 // Writers give the same bytes for the same image. kIo where the file cannot be written whole; what
 // is there then counts for nothing (the caller writes through core/output_folder.h).
-// EXR: 32-bit float, ZIP; channels R, G, B or Y.
+// EXR: 32-bit float, not compressed (imaging/band_writer.h); channels R, G, B or Y.
 [[nodiscard]] Status WriteExr(const std::filesystem::path& path, const Image3& image);
 [[nodiscard]] Status WriteExr(const std::filesystem::path& path, const Image<float>& image);
 // PNG: integers as given, grey or RGB.

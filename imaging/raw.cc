@@ -5,8 +5,10 @@
 #include <algorithm>
 #include <cctype>
 #include <exception>
+#include <functional>
 #include <memory>
 #include <string_view>
+#include <utility>
 
 #include "core/check.h"
 #include "imaging/file_check.h"
@@ -110,24 +112,8 @@ void FillMetadata(const libraw_data_t& data, RawMosaic& mosaic) {
   }
 }
 
-// The visible area as a fraction of the way from black to white.
-void FillSamples(LibRaw& raw, const std::array<float, 4>& black, RawMosaic& mosaic) {
-  const libraw_data_t& data = raw.imgdata;
-  const size_t pitch = data.sizes.raw_pitch / sizeof(data.rawdata.raw_image[0]);
-  mosaic.samples = Image<float>(data.sizes.width, data.sizes.height);
-  for (int y = 0; y < data.sizes.height; ++y) {
-    const auto* row = data.rawdata.raw_image +
-                      pitch * static_cast<size_t>(y + data.sizes.top_margin) +
-                      data.sizes.left_margin;
-    for (int x = 0; x < data.sizes.width; ++x) {
-      const float site_black = black[static_cast<size_t>((y % 2) * 2 + x % 2)];
-      mosaic.samples.At(x, y) =
-          (static_cast<float>(row[x]) - site_black) / (mosaic.white - site_black);
-    }
-  }
-}
-
-Result<RawMosaic> MosaicOf(const std::filesystem::path& path, LibRaw& raw) {
+// What the decoder holds, or why it is no mosaic that we know.
+Result<RawReadings> ReadingsOf(const std::filesystem::path& path, LibRaw& raw) {
   const libraw_image_sizes_t& sizes = raw.imgdata.sizes;
   if (const std::string_view found = NotBayer(raw); !found.empty()) {
     return Fail(ErrorCode::kBadData, "{}: has {}; needed is a 2x2 Bayer mosaic of integers",
@@ -144,33 +130,52 @@ Result<RawMosaic> MosaicOf(const std::filesystem::path& path, LibRaw& raw) {
     return Fail(ErrorCode::kBadData, "{}: its black level repeats every {}x{} sites; needed is 2x2",
                 path.string(), raw.imgdata.color.cblack[5], raw.imgdata.color.cblack[4]);
   }
-  RawMosaic mosaic;
-  mosaic.white = static_cast<float>(raw.imgdata.color.maximum);
-  std::array<float, 4> black = {};
+  RawReadings readings{.size_px = {sizes.width, sizes.height},
+                       .white = static_cast<float>(raw.imgdata.color.maximum),
+                       .pitch = sizes.raw_pitch / sizeof(uint16_t)};
+  readings.first = raw.imgdata.rawdata.raw_image +
+                   readings.pitch * static_cast<size_t>(sizes.top_margin) + sizes.left_margin;
   for (int site = 0; site < 4; ++site) {
     const int x = site % 2;
     const int y = site / 2;
-    mosaic.cfa[static_cast<size_t>(site)] = ColourOf(raw.COLOR(y, x));
-    black[static_cast<size_t>(site)] = BlackLevel(raw, x, y);
-    mosaic.black += black[static_cast<size_t>(site)] / 4.0F;
+    readings.cfa[static_cast<size_t>(site)] = ColourOf(raw.COLOR(y, x));
+    readings.black[static_cast<size_t>(site)] = BlackLevel(raw, x, y);
   }
-  if (*std::ranges::max_element(black) >= mosaic.white) {
+  if (const float black = *std::ranges::max_element(readings.black); black >= readings.white) {
     return Fail(ErrorCode::kBadData, "{}: its black level {} is not below its white level {}",
-                path.string(), *std::ranges::max_element(black), mosaic.white);
+                path.string(), black, readings.white);
   }
-  FillMetadata(raw.imgdata, mosaic);
-  FillSamples(raw, black, mosaic);
+  return readings;
+}
+
+// The visible area as a fraction of the way from black to white.
+RawMosaic FractionsOf(const RawReadings& readings) {
+  RawMosaic mosaic{
+      .samples = Image<float>(readings.size_px), .cfa = readings.cfa, .white = readings.white};
+  for (const float black : readings.black) {
+    mosaic.black += black / 4.0F;
+  }
+  for (int y = 0; y < readings.size_px.height; ++y) {
+    const std::span<const uint16_t> row = readings.Row(y);
+    float* const to = mosaic.samples.pixels.data() + mosaic.samples.Index(0, y);
+    for (size_t x = 0; x < row.size(); ++x) {
+      const float black = readings.black[static_cast<size_t>(y % 2) * 2 + x % 2];
+      to[x] = (static_cast<float>(row[x]) - black) / (readings.white - black);
+    }
+  }
   return mosaic;
 }
 
-Result<RawMosaic> ReadUnguarded(const std::filesystem::path& path) {
+using TakeDecoded = std::function<Status(const RawReadings&, const libraw_data_t&)>;
+
+Status DecodeUnguarded(const std::filesystem::path& path, const TakeDecoded& take) {
   const Result<FileHead> head = ReadFileHead(path);
   if (!head) {
     return tl::unexpected(head.error());
   }
   if (IsTiffHead(head->bytes)) {
     if (const Status whole = CheckTiffIsWhole(path); !whole) {
-      return tl::unexpected(whole.error());
+      return whole;
     }
   }
   const auto raw = std::make_unique<LibRaw>(LIBRAW_OPTIONS_NONE);  // too large for a stack
@@ -180,9 +185,20 @@ Result<RawMosaic> ReadUnguarded(const std::filesystem::path& path) {
     status = raw->unpack();
   }
   if (const Status decoded = CheckDecoded(path, *raw, status); !decoded) {
-    return tl::unexpected(decoded.error());
+    return decoded;
   }
-  return MosaicOf(path, *raw);
+  return ReadingsOf(path, *raw).and_then([&](const RawReadings& readings) {
+    return take(readings, raw->imgdata);
+  });
+}
+
+Status Decode(const std::filesystem::path& path, const TakeDecoded& take) {
+  try {
+    return DecodeUnguarded(path, take);
+  } catch (const std::exception& error) {
+    return Fail(ErrorCode::kBadData, "{}: cannot be decoded as camera RAW: {}", path.string(),
+                error.what());
+  }
 }
 
 // The rows above, at and below a pixel, mirrored at the border; likewise its columns.
@@ -223,12 +239,21 @@ bool IsRawName(const std::filesystem::path& path) {
 }
 
 Result<RawMosaic> ReadRawMosaic(const std::filesystem::path& path) {
-  try {
-    return ReadUnguarded(path);
-  } catch (const std::exception& error) {
-    return Fail(ErrorCode::kBadData, "{}: cannot be decoded as camera RAW: {}", path.string(),
-                error.what());
-  }
+  RawMosaic mosaic;
+  return Decode(path,
+                [&](const RawReadings& readings, const libraw_data_t& data) {
+                  mosaic = FractionsOf(readings);
+                  FillMetadata(data, mosaic);
+                  return Status();
+                })
+      .map([&] { return std::move(mosaic); });
+}
+
+Status TakeRawReadings(const std::filesystem::path& path,
+                       const std::function<Status(const RawReadings&)>& take) {
+  return Decode(path, [&](const RawReadings& readings, const libraw_data_t& /*data*/) {
+    return take(readings);
+  });
 }
 
 Image3 Demosaic(const RawMosaic& mosaic, const std::array<float, 3>& white_balance) {

@@ -3,7 +3,9 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <optional>
+#include <span>
 #include <string>
 
 #include "core/error.h"
@@ -26,6 +28,20 @@ struct RawMosaic {
   std::optional<double> iso;
 };
 
+// The same as integers, while the decoder holds them.
+struct RawReadings {
+  ImageSize size_px;                // of the visible area
+  std::array<uint8_t, 4> cfa = {};  // as in RawMosaic
+  std::array<float, 4> black = {};  // [DN], of the four sites
+  float white = 0.0F;               // [DN]
+  const uint16_t* first = nullptr;  // reading of site (0, 0)
+  size_t pitch = 0;                 // from row to row, in readings
+
+  [[nodiscard]] std::span<const uint16_t> Row(int y) const {
+    return {first + pitch * static_cast<size_t>(y), static_cast<size_t>(size_px.width)};
+  }
+};
+
 // True for the file name endings of camera RAW files.
 [[nodiscard]] bool IsRawName(const std::filesystem::path& path);
 
@@ -35,6 +51,11 @@ struct RawMosaic {
 /// Errors   kIo: the file is absent or unreadable
 ///          kBadData: not a RAW file that can be decoded, cut short, or its CFA is not 2x2 Bayer
 [[nodiscard]] Result<RawMosaic> ReadRawMosaic(const std::filesystem::path& path);
+
+// Decodes as ReadRawMosaic, and hands `take` the readings, which are gone when it returns: nothing of
+// the image's size is kept beside what the decoder needs. Errors of `take` are passed on.
+[[nodiscard]] Status TakeRawReadings(const std::filesystem::path& path,
+                                     const std::function<Status(const RawReadings&)>& take);
 
 // Camera RGB at every pixel. Bilinear: the mean of the nearest sites of each colour; measured
 // values are kept as they are at their own sites. At the border the mosaic continues as its mirror

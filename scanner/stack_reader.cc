@@ -178,7 +178,7 @@ Status ReadMaskInto(const CapturePlan& plan, Capture& capture) {
   if (!mask) {
     return tl::unexpected(mask.error());
   }
-  if (Status status = CheckSize(name, mask->Size(), capture.stack[0].rgb.Size()); !status) {
+  if (Status status = CheckSize(name, mask->Size(), capture.Size()); !status) {
     if (plan.mask_is_shared) {
       capture.warnings.push_back("the mask was left out: " + status.error().message);
       return {};
@@ -208,12 +208,12 @@ void WarnOfSrgb(int srgb_count, Capture& capture) {
 }
 
 Status CheckCamera(const Capture& capture) {
-  const ImageSize size = capture.stack[0].rgb.Size();
+  const ImageSize size = capture.Size();
   if (capture.rig.camera && capture.rig.camera->size_px != size) {
     const ImageSize camera = capture.rig.camera->size_px;
     return Fail(ErrorCode::kBadData,
                 "{}: is {} x {} px but the rig's camera has {} x {} px; need the camera's size",
-                capture.stack[0].name, size.width, size.height, camera.width, camera.height);
+                capture.FirstName(), size.width, size.height, camera.width, camera.height);
   }
   return {};
 }
@@ -226,14 +226,37 @@ Status AddCompanions(const CapturePlan& plan, Capture& capture) {
     }
   }
   if (plan.truth) {
-    Result<Truth> truth =
-        ReadTruth(*plan.truth, capture.stack[0].rgb.Size(), capture.sha256_of_input);
+    Result<Truth> truth = ReadTruth(*plan.truth, capture.Size(), capture.sha256_of_input);
     if (!truth) {
       return tl::unexpected(truth.error());
     }
     capture.truth = *std::move(truth);
   }
   return {};
+}
+
+// As colours or as mosaics.
+Status ReadFrames(const CapturePlan& plan, const ReadCaptureOptions& options, const Task& task,
+                  Capture& capture) {
+  const std::optional<std::string> why_not = WhyNoMosaics(plan, options.by_noise);
+  if (options.domain != Domain::kRgb && !why_not) {
+    return LoadMosaics(plan, options.scratch_dir, task).map([&](LoadedMosaics mosaics) {
+      capture.sha256_of_input = mosaics.sha256_of_input;
+      capture.mosaics = std::move(mosaics);
+    });
+  }
+  if (options.domain == Domain::kRaw) {
+    return Fail(ErrorCode::kBadData, "{}: cannot be solved from the mosaics: {}",
+                plan.lit[0][0].path.string(), *why_not);
+  }
+  if (options.domain == Domain::kAuto) {
+    capture.why_no_mosaics = *why_not;
+  }
+  return LoadFrames(plan.lit, plan.dark, options.encoding, task).map([&](LoadedFrames frames) {
+    capture.stack = std::move(frames.stack);
+    capture.sha256_of_input = std::move(frames.sha256_of_input);
+    WarnOfSrgb(frames.srgb_count, capture);
+  });
 }
 
 }  // namespace
@@ -250,19 +273,15 @@ Result<Capture> ReadCapture(const fs::path& path, const ReadCaptureOptions& opti
   if (const Status status = CheckLitFrames(path, *plan); !status) {
     return tl::unexpected(status.error());
   }
-  Result<LoadedFrames> frames = LoadFrames(plan->lit, plan->dark, options.encoding, task);
-  if (!frames) {
-    return tl::unexpected(frames.error());
-  }
   Capture capture;
+  if (const Status status = ReadFrames(*plan, options, task, capture); !status) {
+    return tl::unexpected(status.error());
+  }
   capture.layout = plan->layout;
-  capture.stack = std::move(frames->stack);
   capture.rig = std::move(plan->rig);
   capture.session = std::move(plan->session);
-  capture.warnings = std::move(plan->warnings);
-  capture.sha256_of_input = std::move(plan->sha256_of_input);
-  capture.sha256_of_input.merge(frames->sha256_of_input);
-  WarnOfSrgb(frames->srgb_count, capture);
+  capture.warnings.insert(capture.warnings.begin(), plan->warnings.begin(), plan->warnings.end());
+  capture.sha256_of_input.merge(plan->sha256_of_input);
   if (const Status status = CheckCamera(capture); !status) {
     return tl::unexpected(status.error());
   }

@@ -11,21 +11,38 @@
 #include "imaging/image_io.h"
 #include "imaging/light_stack.h"
 #include "rig/rig.h"
+#include "scanner/mosaic_loader.h"
 #include "scanner/session.h"
 #include "scanner/truth.h"
 
 namespace sateen {
 
+// What of a capture's frames is read: colours interpolated at every pixel, or readings of the mosaic.
+enum class Domain {
+  kRgb,  // LightStack
+  kRaw,  // LoadedMosaics, or an error
+  kAuto  // LoadedMosaics where the capture allows it
+};
+
 // A capture of any layout, read into values: what the solver needs, and where it came from.
 struct Capture {
-  std::string layout;        // "session", "diligent", "lp", "lights.txt", "photographs"
-  LightStack stack;          // K frames, all of one size
-  Rig rig;                   // K lights in the order of the frames; camera where known
-  std::optional<Mask> mask;  // the part of the image that counts; at least one pixel
+  std::string layout;  // "session", "diligent", "lp", "lights.txt", "photographs"
+  LightStack stack;    // K frames, all of one size; empty where there are mosaics
+  std::optional<LoadedMosaics> mosaics;
+  std::string why_no_mosaics;  // of Domain::kAuto
+  Rig rig;                     // K lights in the order of the frames; camera where known
+  std::optional<Mask> mask;    // the part of the image that counts; at least one pixel
   std::optional<Truth> truth;
   std::optional<Session> session;  // the whole record, also of lights that were not asked for
   std::vector<std::string> warnings;
   std::map<std::string, std::string> sha256_of_input;  // path as read -> hash
+
+  [[nodiscard]] ImageSize Size() const {
+    return mosaics ? mosaics->stack.size_px : stack[0].rgb.Size();
+  }
+  [[nodiscard]] const std::string& FirstName() const {
+    return mosaics ? mosaics->stack.lit[0].name : stack[0].name;
+  }
 };
 
 struct ReadCaptureOptions {
@@ -41,6 +58,9 @@ struct ReadCaptureOptions {
   // not known yet (docs/calibration.md, Chrome spheres).
   bool lights_unknown = false;
   Encoding encoding = Encoding::kAuto;
+  Domain domain = Domain::kRgb;
+  bool by_noise = true;                    // WhyNoMosaics()
+  std::filesystem::path scratch_dir = {};  // LoadMosaics()
 };
 
 /// Reads a capture as it is: a folder with session.json (docs/formats.md), a DiLiGenT folder, an
@@ -49,7 +69,7 @@ struct ReadCaptureOptions {
 ///
 /// Errors   kInvalidArgument: a light that `options` asks for does not exist, or is asked for twice
 ///          kIo: a file is absent or unreadable
-///          kBadData: wrong counts, sizes or formats, a light of zero length, a hash that differs
+///          kBadData: Domain::kRaw of a capture that has no mosaics; wrong counts, sizes or formats, a light of zero length, a hash that differs
 ///          kCancelled
 [[nodiscard]] Result<Capture> ReadCapture(const std::filesystem::path& path,
                                           const ReadCaptureOptions& options, const Task& task = {});

@@ -79,11 +79,12 @@ Status CheckMosaics(const MosaicStack& stack, const Rig& rig, const std::optiona
   }
   for (const MosaicFrame& frame : stack.lit) {
     if (options.mode && !(frame.gain_dn > 0.0 || frame.read_dn > 0.0)) {
-      return Fail(ErrorCode::kBadData,
-                  "{}: its noise is not known, by which mosaics are weighted; need the sensor's gain "
-                  "and read noise in the rig (sateen calibrate response), or solve without weights, "
-                  "or from interpolated colours",
-                  frame.name);
+      return Fail(
+          ErrorCode::kBadData,
+          "{}: its noise is not known, by which mosaics are weighted; need the sensor's gain "
+          "and read noise in the rig (sateen calibrate response), or solve without weights, "
+          "or from interpolated colours",
+          frame.name);
     }
   }
   if (Status status = rig.Validate("rig"); !status || AllDistant(rig.lights)) {
@@ -107,8 +108,8 @@ int64_t SolveInDouble(const MosaicJob& job, const MosaicPiece& piece, bool all, 
     for (int column = 0; column < job.stack.size_px.width; ++column) {
       const size_t p = rows.Index(row) + static_cast<size_t>(column);
       const bool inside = job.mask == nullptr || job.mask->At(column, row) != 0;
-      if (!inside || !(all || field.reason.pixels[p] ==
-                                  static_cast<uint8_t>(Reason::kIllConditioned))) {
+      if (!inside ||
+          !(all || field.reason.pixels[p] == static_cast<uint8_t>(Reason::kIllConditioned))) {
         continue;
       }
       const size_t at =
@@ -305,7 +306,8 @@ Result<bool> ShouldDoubt(const MosaicJob& job, const Task& task) {
   std::atomic<bool> is_read = true;
   const Task silent{.threads = task.threads, .progress = nullptr, .cancel = task.cancel};
   const Status status = ParallelFor(probes, 1, silent, [&](int probe, int) {
-    const auto row = static_cast<int>((static_cast<int64_t>(probe) * 2 + 1) * height / (2 * probes));
+    const auto row =
+        static_cast<int>((static_cast<int64_t>(probe) * 2 + 1) * height / (2 * probes));
     std::vector<float> own;
     if (!SolveRowAlone(job, row, pieces[static_cast<size_t>(probe)], own)) {
       is_read = false;
@@ -376,8 +378,8 @@ class BandSolver {
     };
     NormalField& field = rows_.Field();
     const Task silent{.threads = task_.threads, .progress = nullptr, .cancel = task_.cancel};
-    const Status status = ParallelFor(
-        end - begin, RowsPerPiece(job_.stack.size_px), silent, [&](int from, int to) {
+    const Status status =
+        ParallelFor(end - begin, RowsPerPiece(job_.stack.size_px), silent, [&](int from, int to) {
           for (int row = begin + from; row < begin + to; ++row) {
             const size_t at = rows_.Index(row);
             InterpolateAlbedoRow(job_.stack.cfa, row, {own(row - 1), own(row), own(row + 1)}, width,
@@ -456,8 +458,9 @@ Result<SolveSummary> SolveMosaicByBands(const MosaicStack& stack, const Rig& rig
   if (!prepared) {
     return tl::unexpected(prepared.error());
   }
-  const MosaicJob job{stack,          rig,            mask ? &*mask : nullptr, options, prepared->feed,
-                      prepared->limit, prepared->doubt};
+  const MosaicJob job{
+      stack,          rig, mask ? &*mask : nullptr, options, prepared->feed, prepared->limit,
+      prepared->doubt};
   const int height = stack.size_px.height;
   BandSolver solver(job, task);
   std::array<NormalField, 2> maps;  // one is handed on while the other is solved
@@ -489,13 +492,15 @@ Status SolveMosaicInto(const MosaicStack& stack, const Rig& rig, const std::opti
   if (!prepared) {
     return tl::unexpected(prepared.error());
   }
-  const MosaicJob job{stack,          rig,            mask ? &*mask : nullptr, options, prepared->feed,
-                      prepared->limit, prepared->doubt};
+  const MosaicJob job{
+      stack,          rig, mask ? &*mask : nullptr, options, prepared->feed, prepared->limit,
+      prepared->doubt};
   ResizeMaps(stack.size_px, options.mode.has_value(), field);
   BandSolver solver(job, task);
   Status status;
   for (int begin = 0; status && begin < stack.size_px.height; begin += options.band_rows) {
-    status = solver.Solve(begin, std::min(begin + options.band_rows, stack.size_px.height), field, 0);
+    status =
+        solver.Solve(begin, std::min(begin + options.band_rows, stack.size_px.height), field, 0);
   }
   field.summary = SummaryOf(solver.Total(), options, task, SecondsFrom(start));
   return status;

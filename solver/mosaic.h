@@ -6,10 +6,10 @@
 #include "core/error.h"
 #include "core/task.h"
 #include "imaging/image.h"
+#include "imaging/mosaic_stack.h"
 #include "rig/rig.h"
 #include "solver/ladder.h"
 #include "solver/lambertian.h"
-#include "solver/mosaic_stack.h"
 
 namespace sateen {
 

@@ -73,9 +73,8 @@ Result<MosaicFeed> MosaicFeed::Make(const MosaicStack& stack, const Rig& rig,
     }
     feed.grid_ = *std::move(grid);
   }
-  if (std::ranges::any_of(rig.lights, [](const Light& light) {
-        return light.model == LightModel::kLedField;
-      })) {
+  if (std::ranges::any_of(
+          rig.lights, [](const Light& light) { return light.model == LightModel::kLedField; })) {
     Result<GainRows> gains = GainRows::Make(*rig.camera, rig.lights);
     if (!gains) {
       return tl::unexpected(gains.error());
@@ -139,7 +138,8 @@ void MosaicFeed::ReadDark(MosaicPiece& piece) const {
       for (size_t x = 0; x < width; ++x) {
         const size_t site = above + x % 2;
         piece.dark_[start + x] +=
-            weight * (frame.per_dn[site] * static_cast<float>(rows[start + x]) + frame.at_zero[site]);
+            weight *
+            (frame.per_dn[site] * static_cast<float>(rows[start + x]) + frame.at_zero[site]);
       }
     }
   }
@@ -169,9 +169,8 @@ void MosaicFeed::Locate(MosaicPiece& piece) const {
     for (size_t k = 0; k < frames; ++k) {
       if (gains_->Has(k)) {
         const std::span<float> of_light = std::span(piece.gains_).subspan(k * sites, sites);
-        each_row([&](int row, size_t start) {
-          gains_->Row(k, row, of_light.subspan(start, width));
-        });
+        each_row(
+            [&](int row, size_t start) { gains_->Row(k, row, of_light.subspan(start, width)); });
         piece.gain_places_[k] = of_light.data();
       }
     }
@@ -242,10 +241,9 @@ void MosaicFeed::SolveConsensus(const MosaicPiece& piece, std::span<const size_t
       const size_t row = static_cast<size_t>(piece.begin_) + at / width;
       const size_t site = row % 2 * 2 + at % width % 2;
       const auto reading = static_cast<float>(piece.readings_[k][at]);
-      column(k)[j] = reading >= light.clip_dn
-                         ? std::numeric_limits<float>::quiet_NaN()
-                         : light.per_dn[site] * reading + light.at_zero[site] -
-                               light.inverse_flux[site] * piece.Dark(at);
+      column(k)[j] = reading >= light.clip_dn ? std::numeric_limits<float>::quiet_NaN()
+                                              : light.per_dn[site] * reading + light.at_zero[site] -
+                                                    light.inverse_flux[site] * piece.Dark(at);
       if (!piece.gain_places_.empty() && piece.gain_places_[k] != nullptr) {
         column(frames + k)[j] = piece.gain_places_[k][at];
         gains[k] = column(frames + k);

@@ -6,12 +6,12 @@
 #include <vector>
 
 #include "core/error.h"
+#include "imaging/mosaic_stack.h"
 #include "rig/table_grid.h"
 #include "solver/fast_kernel.h"
 #include "solver/gain_rows.h"
 #include "solver/lambertian.h"
 #include "solver/mosaic_kernel.h"
-#include "solver/mosaic_stack.h"
 
 namespace sateen {
 

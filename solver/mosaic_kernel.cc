@@ -48,7 +48,15 @@ HWY_INLINE V Inverse1(V v) {
 }
 
 // Vectors of a light's figures for the sites of a row, which alternate between two of the pattern.
-enum SiteFigure : size_t { kInverseFlux, kPerDn, kAtZero, kLeast, kShot, kReadSquared, kSiteFigures };
+enum SiteFigure : size_t {
+  kInverseFlux,
+  kPerDn,
+  kAtZero,
+  kLeast,
+  kShot,
+  kReadSquared,
+  kSiteFigures
+};
 
 struct RowState {
   hwy::AlignedFreeUniquePtr<float[]> scratch;
@@ -180,11 +188,11 @@ HWY_INLINE Usable UsableOf(const float* slot, V threshold) {
   const size_t lanes = hn::Lanes(d);
   const V i = hn::Load(d, slot + 3 * lanes);
   const M is = hn::Gt(i, threshold);
-  return {is,
-          {hn::IfThenElseZero(is, hn::Load(d, slot)),
-           hn::IfThenElseZero(is, hn::Load(d, slot + lanes)),
-           hn::IfThenElseZero(is, hn::Load(d, slot + 2 * lanes))},
-          hn::IfThenElseZero(is, i)};
+  return {
+      is,
+      {hn::IfThenElseZero(is, hn::Load(d, slot)), hn::IfThenElseZero(is, hn::Load(d, slot + lanes)),
+       hn::IfThenElseZero(is, hn::Load(d, slot + 2 * lanes))},
+      hn::IfThenElseZero(is, i)};
 }
 
 struct SiteAnswer {
@@ -252,9 +260,9 @@ HWY_INLINE void WeightedSiteStep(const MosaicKernelParams& params, const RowStat
     const Usable u = UsableOf(slot, threshold);
     const V factor = hn::Load(d, slot + 4 * lanes);
     const V predicted = Dot(u.l, answer.n);
-    const V variance = hn::Mul(
-        factor, hn::MulAdd(FigureOf(figures, kShot), hn::Max(predicted, least),
-                           hn::Mul(factor, FigureOf(figures, kReadSquared))));
+    const V variance =
+        hn::Mul(factor, hn::MulAdd(FigureOf(figures, kShot), hn::Max(predicted, least),
+                                   hn::Mul(factor, FigureOf(figures, kReadSquared))));
     const V weight = hn::IfThenElseZero(
         u.is, Inverse1(hn::Clamp(variance, hn::Set(d, 1e-9F), hn::Set(d, 1e9F))));
     const V r = hn::Sub(u.i, predicted);
@@ -275,9 +283,8 @@ HWY_INLINE void WeightedSiteStep(const MosaicKernelParams& params, const RowStat
   const V freedom = hn::Sub(answer.count, hn::Set(d, 3.0F));
   answer.misfit = hn::IfThenElseZero(hn::Gt(freedom, zero),
                                      hn::Div(chi_squared, hn::Mul(unit, hn::Max(freedom, one))));
-  answer.uncertainty_deg =
-      hn::Mul(hn::Sqrt(hn::Mul(AngularVariance(inverse.a, answer.n), unit)),
-              hn::Set(d, kDegreesPerRadian));
+  answer.uncertainty_deg = hn::Mul(hn::Sqrt(hn::Mul(AngularVariance(inverse.a, answer.n), unit)),
+                                   hn::Set(d, kDegreesPerRadian));
 }
 
 HWY_INLINE VI SiteReason(const Readings& readings, M enough, M accepted) {
@@ -285,10 +292,10 @@ HWY_INLINE VI SiteReason(const Readings& readings, M enough, M accepted) {
   const auto code = [&](Reason reason) { return hn::Set(di, static_cast<int32_t>(reason)); };
   const auto bits = [&](M mask) { return hn::RebindMask(di, mask); };
   const M some_saturated = hn::Gt(readings.saturated, hn::Zero(D()));
-  const VI too_few = hn::IfThenElse(bits(some_saturated), code(Reason::kSaturated),
-                                    code(Reason::kTooFewSamples));
-  const VI answered = hn::IfThenElse(bits(accepted), code(Reason::kSolved),
-                                     code(Reason::kIllConditioned));
+  const VI too_few =
+      hn::IfThenElse(bits(some_saturated), code(Reason::kSaturated), code(Reason::kTooFewSamples));
+  const VI answered =
+      hn::IfThenElse(bits(accepted), code(Reason::kSolved), code(Reason::kIllConditioned));
   return hn::IfThenElse(bits(readings.bright), hn::IfThenElse(bits(enough), answered, too_few),
                         code(Reason::kDark));
 }
@@ -433,12 +440,11 @@ void InterpolateAlbedoRowImpl(const std::array<uint8_t, 4>& cfa, int row, const 
         return cfa[static_cast<size_t>(row % 2) * 2 + place] == c ? 1.0F : 0.0F;
       };
       const V count = Total(taken, counts);
-      const M is_mean = hn::And(
-          hn::Gt(count, zero),
-          hn::Eq(hn::OddEven(hn::Set(d, is_own(1)), hn::Set(d, is_own(0))), zero));
+      const M is_mean =
+          hn::And(hn::Gt(count, zero),
+                  hn::Eq(hn::OddEven(hn::Set(d, is_own(1)), hn::Set(d, is_own(0))), zero));
       const V mean = hn::Div(Total(taken, sums), hn::Max(count, hn::Set(d, 1.0F)));
-      const V value =
-          hn::IfThenElseZero(hn::Gt(here, zero), hn::IfThenElse(is_mean, mean, here));
+      const V value = hn::IfThenElseZero(hn::Gt(here, zero), hn::IfThenElse(is_mean, mean, here));
       hn::StoreU(value, d, whole ? albedo[c] + x : spare + c * lanes);
       if (!whole) {
         std::copy_n(spare + c * lanes, width - x, albedo[c] + x);
@@ -455,8 +461,8 @@ void TouchMosaicRowImpl(const MosaicKernelParams& params, const MosaicKernelInpu
     for (size_t k = 0; k < params.lights.size(); ++k) {
       sum = hn::Add(sum, LoadReadings(input.readings[k] + offset));
     }
-    for (float* to : {output.normal[0], output.normal[1], output.normal[2], output.albedo,
-                      output.residual}) {
+    for (float* to :
+         {output.normal[0], output.normal[1], output.normal[2], output.albedo, output.residual}) {
       hn::StoreU(sum, d, to + offset);
     }
     StoreBytes(hn::Set(DI(), 1), output.samples + offset);

@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "imaging/mosaic_stack.h"
 #include "rig/light.h"
-#include "solver/mosaic_stack.h"
 
 namespace sateen {
 

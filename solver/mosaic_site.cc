@@ -102,7 +102,7 @@ void MosaicSite::Gather(int column, int row, const std::vector<uint16_t>& readin
       frames_[static_cast<size_t>(to)] = frames_[static_cast<size_t>(k)];
     }
   }
-  solution.reason = !bright                  ? Reason::kDark
+  solution.reason = !bright                 ? Reason::kDark
                     : solution.samples >= 3 ? Reason::kSolved
                     : saturated > 0         ? Reason::kSaturated
                                             : Reason::kTooFewSamples;

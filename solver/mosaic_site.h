@@ -3,9 +3,9 @@
 #include <Eigen/Core>
 #include <vector>
 
+#include "imaging/mosaic_stack.h"
 #include "rig/rig.h"
 #include "solver/lambertian.h"
-#include "solver/mosaic_stack.h"
 
 namespace sateen {
 

@@ -49,8 +49,7 @@ struct Readings {
         for (int x = 0; x < readings.width; ++x) {
           const size_t c = kRggb[static_cast<size_t>(y % 2 * 2 + x % 2)];
           const auto radiance = static_cast<double>(scene.stack[k].rgb[c].At(x, y));
-          readings.At(x, y) =
-              static_cast<uint16_t>(std::lround(kBlackDn + radiance / per_dn));
+          readings.At(x, y) = static_cast<uint16_t>(std::lround(kBlackDn + radiance / per_dn));
         }
       }
       frames.push_back(std::move(readings));
@@ -186,7 +185,8 @@ TEST(MosaicTest, EverySiteIsSolvedInItsOwnColour) {
     light.flux_rgb = {0.5, 1.0, 2.0};
   }
   RenderedRelief truth =
-      RenderRelief({.max_slope_rad = 0.4, .albedo_min = 0.5, .albedo_max = 0.5}, rig, kSize).value();
+      RenderRelief({.max_slope_rad = 0.4, .albedo_min = 0.5, .albedo_max = 0.5}, rig, kSize)
+          .value();
   for (LightFrame& frame : truth.stack) {
     for (size_t c = 0; c < 3; ++c) {
       for (float& value : frame.rgb[c].pixels) {
@@ -296,8 +296,8 @@ TEST(MosaicTest, BandsAndThreadsGiveTheSameBits) {
       EXPECT_EQ(first_row, expected_row);
       expected_row += band.reason.height;
       const auto put = [&](const auto& from, auto& to) {
-        std::ranges::copy(from.pixels, to.pixels.begin() + static_cast<std::ptrdiff_t>(
-                                                               to.Index(0, first_row)));
+        std::ranges::copy(from.pixels,
+                          to.pixels.begin() + static_cast<std::ptrdiff_t>(to.Index(0, first_row)));
       };
       for (size_t c = 0; c < 3; ++c) {
         put(band.normal[c], joined.normal[c]);

@@ -40,6 +40,9 @@ class MosaicRows {
                                                        std::vector<uint16_t>& buffer) const = 0;
 };
 
+// Rows [begin, end) of an image.
+[[nodiscard]] std::span<const uint16_t> RowsOf(const Image<uint16_t>& mosaic, int begin, int end);
+
 // In memory.
 class MosaicsInMemory final : public MosaicRows {
  public:

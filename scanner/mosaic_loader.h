@@ -1,0 +1,41 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/error.h"
+#include "core/task.h"
+#include "imaging/mosaic_stack.h"
+#include "scanner/capture_plan.h"
+
+namespace sateen {
+
+// Readings of a capture, and what keeps them: memory, or a file without a name that goes when this does.
+struct LoadedMosaics {
+  MosaicStack stack;  // its rows are `readings`
+  std::unique_ptr<MosaicRows> readings;
+  std::map<std::string, std::string> sha256_of_input;
+};
+
+// Why the frames of a capture cannot be solved from their mosaics; nothing where they can be.
+// `by_noise`: the solve weighs them by the sensor's noise, which must be known.
+[[nodiscard]] std::optional<std::string> WhyNoMosaics(const CapturePlan& plan, bool by_noise);
+
+/// Decodes the frames of a capture whose WhyNoMosaics() is nothing. Up to kMosaicBytesInMemory they
+/// stay in memory; beyond they go to a scratch file in `scratch_dir`, row by row as the decoder has
+/// them, and no more frames are decoded at once than kDecodedBytesAtOnce holds (but one).
+///
+/// Errors  as LoadFrames(); kIo where the scratch file cannot be written, with the room it needs
+[[nodiscard]] Result<LoadedMosaics> LoadMosaics(const CapturePlan& plan,
+                                                const std::filesystem::path& scratch_dir,
+                                                const Task& task);
+
+inline constexpr std::uintmax_t kMosaicBytesInMemory = std::uintmax_t{256} << 20;
+inline constexpr std::uintmax_t kDecodedBytesAtOnce = std::uintmax_t{640} << 20;
+
+}  // namespace sateen
