@@ -104,10 +104,15 @@ MosaicPiece MosaicFeed::Read(int begin, int end) const {
   MosaicPiece piece;
   piece.begin_ = begin;
   piece.end_ = end;
+  piece.read_begin_ = std::max(0, begin - 1);
+  piece.read_end_ = std::min(stack_->size_px.height, end + 1);
+  piece.beyond_ =
+      static_cast<size_t>(stack_->size_px.width) * static_cast<size_t>(begin - piece.read_begin_);
   const size_t frames = stack_->lit.size();
   piece.buffers_.resize(frames);
   for (size_t k = 0; k < frames; ++k) {
-    const std::span<const uint16_t> rows = stack_->rows->Read(k, begin, end, piece.buffers_[k]);
+    const std::span<const uint16_t> rows =
+        stack_->rows->Read(k, piece.read_begin_, piece.read_end_, piece.buffers_[k]);
     piece.is_read_ = piece.is_read_ && !rows.empty();
     piece.readings_.push_back(rows.data());
   }
@@ -121,19 +126,19 @@ void MosaicFeed::ReadDark(MosaicPiece& piece) const {
     return;
   }
   const auto width = static_cast<size_t>(stack_->size_px.width);
-  piece.dark_.assign(width * static_cast<size_t>(piece.end_ - piece.begin_), 0.0F);
+  piece.dark_.assign(width * static_cast<size_t>(piece.read_end_ - piece.read_begin_), 0.0F);
   std::vector<uint16_t> buffer;
   for (size_t k = 0; k < stack_->dark.size(); ++k) {
     const std::span<const uint16_t> rows =
-        stack_->rows->Read(stack_->lit.size() + k, piece.begin_, piece.end_, buffer);
+        stack_->rows->Read(stack_->lit.size() + k, piece.read_begin_, piece.read_end_, buffer);
     if (rows.empty()) {
       piece.is_read_ = false;
       return;
     }
     const MosaicFrame& frame = stack_->dark[k];
     const float weight = stack_->dark_weights[k];
-    for (int row = piece.begin_; row < piece.end_; ++row) {
-      const size_t start = width * static_cast<size_t>(row - piece.begin_);
+    for (int row = piece.read_begin_; row < piece.read_end_; ++row) {
+      const size_t start = width * static_cast<size_t>(row - piece.read_begin_);
       const size_t above = static_cast<size_t>(row % 2) * 2;
       for (size_t x = 0; x < width; ++x) {
         const size_t site = above + x % 2;
@@ -187,7 +192,7 @@ void MosaicFeed::Run(RowFunction function, const MosaicPiece& piece, const Mask*
     const size_t to = rows.Index(row);
     NormalField& field = rows.Field();
     std::ranges::transform(piece.readings_, readings.begin(),
-                           [&](const uint16_t* frame) { return frame + start; });
+                           [&](const uint16_t* frame) { return frame + piece.beyond_ + start; });
     std::ranges::transform(piece.gain_places_, gains.begin(), [&](const float* of_light) {
       return of_light == nullptr ? nullptr : of_light + start;
     });
@@ -197,7 +202,7 @@ void MosaicFeed::Run(RowFunction function, const MosaicPiece& piece, const Mask*
     };
     function(params_,
              {.readings = readings.data(),
-              .dark = from(piece.dark_),
+              .dark = piece.dark_.empty() ? nullptr : piece.dark_.data() + piece.beyond_ + start,
               .x_mm = from(piece.x_mm_),
               .y_mm = from(piece.y_mm_),
               .inverse_gains = gains.empty() ? nullptr : gains.data(),
@@ -220,69 +225,6 @@ void MosaicFeed::Solve(const MosaicPiece& piece, const Mask* mask, SiteRows& row
 
 void MosaicFeed::Touch(const MosaicPiece& piece, SiteRows& rows) const {
   Run(TouchMosaicRow, piece, nullptr, rows);
-}
-
-void MosaicFeed::SolveConsensus(const MosaicPiece& piece, std::span<const size_t> sites,
-                                SiteRows& rows, std::span<uint8_t> agreeing) const {
-  const size_t count = sites.size();
-  const size_t frames = stack_->lit.size();
-  const auto width = static_cast<size_t>(stack_->size_px.width);
-  const size_t shift = rows.Index(piece.begin_);
-  NormalField& field = rows.Field();
-  // Side by side, so that every lane of a vector has work.
-  std::vector<float> gathered((2 * frames + 2) * count, 0.0F);
-  const auto column = [&](size_t index) { return gathered.data() + index * count; };
-  std::vector<const float*> planes;
-  std::vector<const float*> gains(frames, nullptr);
-  for (size_t k = 0; k < frames; ++k) {
-    const MosaicKernelLight& light = params_.lights[k];
-    for (size_t j = 0; j < count; ++j) {
-      const size_t at = sites[j] - shift;
-      const size_t row = static_cast<size_t>(piece.begin_) + at / width;
-      const size_t site = row % 2 * 2 + at % width % 2;
-      const auto reading = static_cast<float>(piece.readings_[k][at]);
-      column(k)[j] = reading >= light.clip_dn ? std::numeric_limits<float>::quiet_NaN()
-                                              : light.per_dn[site] * reading + light.at_zero[site] -
-                                                    light.inverse_flux[site] * piece.Dark(at);
-      if (!piece.gain_places_.empty() && piece.gain_places_[k] != nullptr) {
-        column(frames + k)[j] = piece.gain_places_[k][at];
-        gains[k] = column(frames + k);
-      }
-    }
-    planes.insert(planes.end(), 3, column(k));
-  }
-  for (size_t j = 0; j < count && grid_; ++j) {
-    column(2 * frames)[j] = piece.x_mm_[sites[j] - shift];
-    column(2 * frames + 1)[j] = piece.y_mm_[sites[j] - shift];
-  }
-  std::vector<float> results(8 * count);
-  std::vector<uint8_t> bytes(2 * count);
-  const auto result = [&](size_t index) { return results.data() + index * count; };
-  SolveConsensusSpan(consensus_,
-                     {.planes = planes.data(),
-                      .x_mm = column(2 * frames),
-                      .y_mm = column(2 * frames + 1),
-                      .inverse_gains = gains.data(),
-                      .count = count},
-                     {.normal = {result(0), result(1), result(2)},
-                      .albedo = {result(3), result(4), result(5)},
-                      .residual = result(6),
-                      .samples = bytes.data(),
-                      .reason = bytes.data() + count,
-                      .uncertainty = result(7),
-                      .agreeing = agreeing.data()});
-  for (size_t j = 0; j < count; ++j) {
-    if (bytes[count + j] != static_cast<uint8_t>(Reason::kSolved)) {
-      agreeing[j] = 0;
-      continue;
-    }
-    for (size_t c = 0; c < 3; ++c) {
-      field.normal[c].pixels[sites[j]] = result(c)[j];
-    }
-    rows.OwnColour(sites[j]) = result(3)[j];
-    field.residual.pixels[sites[j]] = result(6)[j];
-    field.uncertainty.pixels[sites[j]] = result(7)[j];
-  }
 }
 
 }  // namespace sateen

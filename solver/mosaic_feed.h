@@ -36,14 +36,19 @@ class SiteRows {
   std::vector<float> misfit_;
 };
 
-// What the kernels need of rows [begin, end): readings, dark frame and geometry.
+// What the kernels need of rows [begin, end): readings and dark frame, of a row more on either side, and
+// geometry. Sites are counted from the first of row `begin`.
 class MosaicPiece {
  public:
   [[nodiscard]] bool IsRead() const { return is_read_; }
   [[nodiscard]] int Begin() const { return begin_; }
   [[nodiscard]] int End() const { return end_; }
-  [[nodiscard]] uint16_t Reading(size_t frame, size_t site) const { return readings_[frame][site]; }
-  [[nodiscard]] float Dark(size_t site) const { return dark_.empty() ? 0.0F : dark_[site]; }
+  [[nodiscard]] uint16_t Reading(size_t frame, size_t site) const {
+    return readings_[frame][beyond_ + site];
+  }
+  [[nodiscard]] float Dark(size_t site) const {
+    return dark_.empty() ? 0.0F : dark_[beyond_ + site];
+  }
 
  private:
   friend class MosaicFeed;
@@ -51,6 +56,9 @@ class MosaicPiece {
   bool is_read_ = true;
   int begin_ = 0;
   int end_ = 0;
+  int read_begin_ = 0;  // with the rows beyond
+  int read_end_ = 0;
+  size_t beyond_ = 0;  // sites before row `begin`
   std::vector<std::vector<uint16_t>> buffers_;
   std::vector<const uint16_t*> readings_;  // of each lit frame
   std::vector<float> dark_;
@@ -70,7 +78,8 @@ class MosaicFeed {
   [[nodiscard]] MosaicPiece Read(int begin, int end) const;
   // Into the rows of `rows` that are the piece's; `mask` of the whole image or null.
   void Solve(const MosaicPiece& piece, const Mask* mask, SiteRows& rows) const;
-  // Rung 2 for the sites listed by their index in `rows`, as FastRows::SolveConsensus.
+  // Rung 2 for the sites listed by their index in `rows`, as FastRows::SolveConsensus: with the site's
+  // own colour, or, where samples agree far better, with the colours interpolated from its neighbours.
   void SolveConsensus(const MosaicPiece& piece, std::span<const size_t> sites, SiteRows& rows,
                       std::span<uint8_t> agreeing) const;
   // Reads and writes the same bytes and only adds them up: the floor of Solve.
@@ -80,6 +89,15 @@ class MosaicFeed {
   using RowFunction = void (*)(const MosaicKernelParams&, const MosaicKernelInput&,
                                const MosaicKernelOutput&);
 
+  struct Consensus;
+
+  // i' but for the light's geometry, of the site in column x of the image's row y; NaN where it is
+  // saturated. `colour` of another site is the mean of the nearest ones.
+  [[nodiscard]] float SampleAt(const MosaicPiece& piece, size_t frame, int x, int y) const;
+  [[nodiscard]] float ColourAt(const MosaicPiece& piece, size_t frame, int x, int y,
+                               size_t colour) const;
+  [[nodiscard]] Consensus Search(const MosaicPiece& piece, std::span<const size_t> sites,
+                                 bool coloured) const;
   explicit MosaicFeed(const MosaicStack& stack) : stack_(&stack) {}
   void ReadDark(MosaicPiece& piece) const;
   void Locate(MosaicPiece& piece) const;
