@@ -19,9 +19,10 @@ Result<CaptureRequest> RequestOf(const CaptureArgs& args) {
   request.resume = !args.resume.empty();
   if (request.resume) {
     request.output = args.resume;
+    request.new_exposure = !args.exposure.empty();
   }
   options.kind = args.sheet ? SessionKind::kSheet : SessionKind::kFabric;
-  if (args.exposure != "auto") {
+  if (!args.exposure.empty() && args.exposure != "auto") {
     const Result<double> exposure_s = ParseExposure(args.exposure);
     if (!exposure_s) {
       return tl::unexpected(exposure_s.error());
@@ -119,10 +120,9 @@ void AddCapture(CLI::App& root, CaptureArgs& args) {
   cmd->add_flag("--sheet", args.sheet, "It is a sheet of white paper, to calibrate the lights by")
       ->excludes(resume);
   cmd->add_option("--exposure", args.exposure,
-                  "Exposure of each frame, as 1/50 or 20ms; auto: by test frames of the brightest "
-                  "light, and several a light where one cannot hold the scene")
-      ->capture_default_str()
-      ->excludes(resume);
+                  "Exposure of each frame, as 1/50 or 20ms; auto, the default: by test frames of the "
+                  "brightest light, and several a light where one cannot hold the scene. With "
+                  "--resume: every frame is taken again, at this one");
   cmd->add_option("--aperture", options.f_number, "f-number")
       ->capture_default_str()
       ->excludes(resume);

@@ -17,6 +17,8 @@ struct CaptureRequest {
   std::filesystem::path rig;     // not on resuming: the session has its own
   std::filesystem::path output;  // folder of the session
   bool resume = false;
+  // On resuming: every frame again, at the exposure of `options`, which is found where it has none.
+  bool new_exposure = false;
   CaptureOptions options;
 };
 

@@ -120,7 +120,8 @@ Result<Rig> CaptureSession::CheckBegin(const fs::path& dir, const fs::path& rig_
   if (status && (Exists(dir / kRecordFile) || HasFrames(dir))) {
     status =
         Fail(ErrorCode::kInvalidArgument,
-             "{}: holds a session already; choose another folder, or go on with it: --resume {}",
+             "{}: holds a session already; choose another folder, or go on with it: sateen capture "
+             "--resume {}",
              dir.string(), dir.string());
   }
   return status ? std::move(rig) : tl::unexpected(status.error());
@@ -161,16 +162,12 @@ Result<CaptureSession> CaptureSession::Begin(const fs::path& dir, const fs::path
   return CaptureSession(dir, *std::move(rig), journal, *std::move(writer), options);
 }
 
-Result<CaptureSession> CaptureSession::Resume(const fs::path& dir, const CaptureOptions& options) {
-  if (const Status valid = options.Validate(); !valid) {
-    return tl::unexpected(valid.error());
-  }
+Result<Journal> CaptureSession::CheckResume(const fs::path& dir) {
   if (!Exists(dir / kJournalFile)) {
     return Fail(ErrorCode::kIo, "{}: is not there; nothing was captured",
                 (dir / kJournalFile).string());
   }
-  Result<JournalWriter> writer = JournalWriter::Open(dir);
-  Result<std::optional<Journal>> read = writer ? ReadJournal(dir) : tl::unexpected(writer.error());
+  Result<std::optional<Journal>> read = ReadJournal(dir);
   if (!read) {
     return tl::unexpected(read.error());
   }
@@ -178,10 +175,10 @@ Result<CaptureSession> CaptureSession::Resume(const fs::path& dir, const Capture
     return Fail(ErrorCode::kBadData, "{}: nothing was captured yet; begin anew, with --rig and -o",
                 dir.string());
   }
-  Journal journal = **std::move(read);
+  const Journal& journal = **read;
   const fs::path rig_file = dir / journal.begun.rig;
   const Result<std::string> hash = Sha256OfFile(rig_file);
-  Result<Rig> rig = hash ? ReadRig(rig_file) : tl::unexpected(hash.error());
+  const Result<Rig> rig = hash ? ReadRig(rig_file) : tl::unexpected(hash.error());
   if (!rig) {
     return tl::unexpected(rig.error());
   }
@@ -194,10 +191,51 @@ Result<CaptureSession> CaptureSession::Resume(const fs::path& dir, const Capture
     return Fail(ErrorCode::kBadData, "{}: plans other frames than this program takes; capture anew",
                 (dir / kJournalFile).string());
   }
-  if (const Status kept = writer->Keep(journal.whole_bytes); !kept) {
+  return **std::move(read);
+}
+
+Result<CaptureSession> CaptureSession::Resume(const fs::path& dir, const CaptureOptions& options) {
+  Status ready = options.Validate().and_then([&] { return CheckResume(dir).map([](Journal) {}); });
+  Result<JournalWriter> writer =
+      ready ? JournalWriter::Open(dir) : tl::unexpected(ready.error());
+  // Again, now that no other program can go on here.
+  Result<Journal> journal = writer ? CheckResume(dir) : tl::unexpected(writer.error());
+  Result<Rig> rig = journal ? ReadRig(dir / journal->begun.rig) : tl::unexpected(journal.error());
+  if (!rig) {
+    return tl::unexpected(rig.error());
+  }
+  if (const Status kept = writer->Keep(journal->whole_bytes); !kept) {
     return tl::unexpected(kept.error());
   }
-  return CaptureSession(dir, *std::move(rig), std::move(journal), *std::move(writer), options);
+  return CaptureSession(dir, *std::move(rig), *std::move(journal), *std::move(writer), options);
+}
+
+Status CaptureSession::ChangeExposure(std::optional<double> exposure_s) {
+  if (journal_.complete) {
+    return Fail(ErrorCode::kInvalidArgument,
+                "{}: is a complete session, whose exposure cannot change; capture anew, into "
+                "another folder",
+                dir_.string());
+  }
+  asked_anew_ = AskedAnew{exposure_s};
+  return {};
+}
+
+std::optional<double> CaptureSession::AskedExposure() const {
+  return asked_anew_ ? asked_anew_->exposure_s : journal_.begun.exposure_s;
+}
+
+Error CaptureSession::WithNextStep(Error error) const {
+  const std::string command = "sateen capture --resume";
+  if (journal_.complete || error.message.find(command) != std::string::npos) {
+    return error;
+  }
+  if (Open().size() < journal_.done.size()) {
+    error.message += fmt::format("; then go on: {} {}", command, dir_.string());
+  } else if (error.code != ErrorCode::kInvalidArgument) {
+    error.message += "; no frame is kept yet: then give the same command again";
+  }
+  return error;
 }
 
 std::vector<std::size_t> CaptureSession::Open() const {
@@ -384,9 +422,9 @@ Result<CaptureSummary> CaptureSession::Finish() {
 }
 
 Status CaptureSession::TakeAll(Tools& tools) {
-  for (int plans = 0; journal_.plan.empty() || !Open().empty();) {
+  for (int plans = 0; journal_.plan.empty() || asked_anew_ || !Open().empty();) {
     Status done;
-    if (journal_.plan.empty() || brighter_) {
+    if (journal_.plan.empty() || asked_anew_ || brighter_) {
       if (plans++ == kMostPlans) {
         return Fail(ErrorCode::kBadData,
                     "light '{}' is too bright for every exposure that was found; do the lights "
@@ -406,6 +444,14 @@ Status CaptureSession::TakeAll(Tools& tools) {
 Result<CaptureSummary> CaptureSession::Run(LightBoard& board, TetheredCamera& camera,
                                            const Task& task, const CaptureObserver& observer) {
   Tools tools{board, camera, task, observer};
+  Result<CaptureSummary> summary = TakeAndCheck(tools);
+  if (!summary) {
+    summary = tl::unexpected(WithNextStep(std::move(summary.error())));
+  }
+  return summary;
+}
+
+Result<CaptureSummary> CaptureSession::TakeAndCheck(Tools& tools) {
   if (const Status verified = VerifyDone(); !verified) {
     return tl::unexpected(verified.error());
   }

@@ -69,8 +69,10 @@ struct CaptureSummary {
 /// says are done and whose hashes still hold are not taken again.
 ///
 /// Errors   kInvalidArgument: options; a folder that holds a session
-///          kBadData: rig or journal; a frame that fails its checks as often as it is tried
+///          kBadData: rig or journal; a frame that fails its checks as often as it is tried, or that is
+///          clipped at an exposure given by hand, which is not tried again
 ///          kDevice, kTimeout: board or camera, after all tries; kIo: the disk; kCancelled
+/// What ends a capture says once how to go on with it.
 /// After any error, and when this goes out of scope, all lights have been told to go off.
 class CaptureSession {
  public:
@@ -85,9 +87,18 @@ class CaptureSession {
   // Of `options` what the journal says is not used: kind, exposure, level.
   [[nodiscard]] static Result<CaptureSession> Resume(const std::filesystem::path& dir,
                                                      const CaptureOptions& options);
+  // Whether Resume() could: what the journal says. Locks and changes nothing.
+  [[nodiscard]] static Result<Journal> CheckResume(const std::filesystem::path& dir);
+  // Run() takes every frame again: at this exposure, or at one that it finds. Later runs keep to it.
+  // kInvalidArgument: the session is complete.
+  [[nodiscard]] Status ChangeExposure(std::optional<double> exposure_s);
 
   [[nodiscard]] const Journal& Record() const { return journal_; }
   [[nodiscard]] const Rig& GetRig() const { return rig_; }
+  // As given by hand; nothing: it is found.
+  [[nodiscard]] std::optional<double> AskedExposure() const;
+  // The error with the command that goes on, where there is one and it does not say so itself.
+  [[nodiscard]] Error WithNextStep(Error error) const;
   // Frames of the plan that are still to be taken.
   [[nodiscard]] std::vector<std::size_t> Open() const;
 
@@ -116,6 +127,7 @@ class CaptureSession {
   CaptureSession(std::filesystem::path dir, Rig rig, Journal journal, JournalWriter writer,
                  const CaptureOptions& options);
 
+  [[nodiscard]] Result<CaptureSummary> TakeAndCheck(Tools& tools);
   [[nodiscard]] Status VerifyDone();
   [[nodiscard]] Status MakePlan(Tools& tools);
   [[nodiscard]] Result<std::vector<double>> Meter(std::size_t light, Tools& tools);
@@ -126,6 +138,7 @@ class CaptureSession {
   [[nodiscard]] Status TakeOpenFrames(Tools& tools);
   [[nodiscard]] Result<Arrived> Shoot(std::size_t frame, int attempt, Tools& tools);
   [[nodiscard]] Status Settle(Arrived arrived, Tools& tools);
+  [[nodiscard]] Status CheckClipped(std::size_t frame, const SignalLevels& levels);
   [[nodiscard]] Status Place(const Arrived& arrived, SessionFrame& record);
   [[nodiscard]] Status TakeAgain(Error error, std::size_t frame, int attempt, Tools& tools);
   [[nodiscard]] Result<ExposureSettings> Configure(double exposure_s, TetheredCamera& camera);
@@ -153,6 +166,11 @@ class CaptureSession {
     ExposureSettings settings;  // as the camera has them
   };
   std::optional<Configured> configured_;
+  struct AskedAnew {
+    std::optional<double> exposure_s;
+  };
+  std::optional<AskedAnew> asked_anew_;  // until there is a plan for it
+  bool is_clipped_ = false;              // the latest frame that failed, at an exposure given by hand
   std::vector<std::optional<FrameLook>> looks_;  // of done frames
   std::optional<std::size_t> brighter_;          // light that the exposures found are too long for
   double peak_ = 0.0;

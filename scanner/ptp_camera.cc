@@ -161,6 +161,7 @@ Result<json> PtpCamera::Ask(const json& request, milliseconds longest) {
                     : "; connect anew");
   }
   if (answer->contains("error")) {
+    card_is_full_ = CardIsFull((*answer)["error"]);
     if (ConnectionIsGone((*answer)["error"])) {
       state_ = State::kLost;
     }
@@ -344,6 +345,7 @@ Result<CapturedFile> PtpCamera::Capture(const fs::path& folder, milliseconds lon
   if (state_ != State::kOpen) {
     return Fail(ErrorCode::kDevice, "the camera is not connected");
   }
+  card_is_full_ = false;
   const Deadline deadline(longest);
   const Result<FileOnCamera> file = Expose(deadline);
   if (!file) {

@@ -14,7 +14,8 @@ namespace sateen {
 // block for ever; whoever waits kills this process then.
 //
 // Each request {"do": ...} has one answer. Where it fails that is {"error": {"code", "text",
-// "while"}}, code as libgphoto2 has it.
+// "while"}}, code as libgphoto2 has it; {"error": {"errno", "path"}} where a file of this computer cannot
+// be written, which is not the camera's fault.
 //
 //     do        fields                     answer
 //     list                                 cameras [{model, port}]
