@@ -95,7 +95,10 @@ FramePlan PlanOf(const Rig& rig, const std::vector<double>& exposures_s) {
 
 Session SessionOf(const Journal& journal) {
   Session session{
-      .kind = journal.begun.kind, .rig = journal.begun.rig, .rig_sha256 = journal.begun.rig_sha256};
+      .kind = journal.begun.kind,
+      .rig = journal.begun.rig,
+      .rig_sha256 = journal.begun.rig_sha256,
+      .has_journal = true};
   for (const std::optional<SessionFrame>& frame : journal.done) {
     SATEEN_CHECK(frame.has_value());
     session.frames.push_back(*frame);

@@ -187,11 +187,21 @@ inline constexpr const char* kIncoming = ".sateen-incoming";
 // The session that a complete journal tells of.
 [[nodiscard]] Session SessionOf(const Journal& journal);
 
+// What was found of a session on disk.
+struct SessionProof {
+  int files = 0;                    // that are as they were captured
+  std::vector<std::string> faults;  // one sentence each, with what to do; none: it is whole
+};
+
 /// Proves a session on disk whole: session.json, journal and rig agree, each light of the rig has its
-/// frame, and each file has the hash that was recorded. A session without a journal, which no capture
-/// made, is proved by what it records. Returns how many files were hashed.
+/// frame, and each file has the hash that was recorded. A session whose session.json names no journal,
+/// and that has none, was made by no capture, and is proved by what it records.
 ///
-/// Errors   kBadData, kIo: the first thing that is not so
+/// Errors   kIo: there is no such folder; kCancelled
+[[nodiscard]] Result<SessionProof> ProveSession(const std::filesystem::path& dir, const Task& task);
+
+// The same where anything but a whole session is an error, kBadData: all faults, one a line. Returns
+// how many files were hashed.
 [[nodiscard]] Result<int> VerifySession(const std::filesystem::path& dir, const Task& task);
 
 }  // namespace sateen

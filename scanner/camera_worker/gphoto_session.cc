@@ -27,6 +27,9 @@ using WidgetPtr = std::unique_ptr<CameraWidget, Freer<CameraWidget, gp_widget_fr
 using FilePtr = std::unique_ptr<CameraFile, Freer<CameraFile, gp_file_unref>>;
 using ListPtr = std::unique_ptr<CameraList, Freer<CameraList, gp_list_free>>;
 
+// A card with less has no room for another RAW file. [KB]
+constexpr uint64_t kLeastRoomKb = 64ULL * 1024;
+
 int MillisecondsSince(steady_clock::time_point start) {
   return static_cast<int>(
       std::chrono::duration_cast<milliseconds>(steady_clock::now() - start).count());
@@ -264,6 +267,23 @@ json GphotoSession::Set(const std::string& name, const std::string& value) {
   return code < GP_OK ? Failure(code, "setting " + name + " to " + value) : json::object();
 }
 
+// Of some cameras libgphoto2 says nothing but that a capture has failed: Nikon's.
+bool GphotoSession::CardHasRoom() {
+  CameraStorageInformation* raw = nullptr;
+  int count = 0;
+  if (gp_camera_get_storageinfo(camera_, &raw, &count, context_) < GP_OK) {
+    return true;  // nothing is known
+  }
+  const std::unique_ptr<CameraStorageInformation, decltype(&std::free)> owner(raw, &std::free);
+  bool known = false;
+  bool room = false;
+  for (int k = 0; k < count; ++k) {
+    known |= (raw[k].fields & GP_STORAGEINFO_FREESPACEKBYTES) != 0;
+    room |= raw[k].freekbytes >= kLeastRoomKb;
+  }
+  return room || !known;
+}
+
 json GphotoSession::Trigger(int wait_ms) {
   const auto start = steady_clock::now();
   while (true) {
@@ -273,7 +293,12 @@ json GphotoSession::Trigger(int wait_ms) {
       return {{"after_ms", after_ms}};
     }
     if (code != GP_ERROR_CAMERA_BUSY || MillisecondsSince(start) >= wait_ms) {
-      return Failure(code, "taking a frame");
+      json failure = Failure(code, "taking a frame");
+      if (code == GP_ERROR && !CardHasRoom()) {
+        failure["error"]["code"] = GP_ERROR_NO_SPACE;
+      }
+      words_.clear();
+      return failure;
     }
     words_.clear();
     std::this_thread::sleep_for(milliseconds(20));

@@ -43,6 +43,7 @@ class GphotoSession {
   nlohmann::json Get(const std::string& name);
   nlohmann::json Set(const std::string& name, const std::string& value);
   nlohmann::json Trigger(int wait_ms);
+  bool CardHasRoom();
   nlohmann::json Await(int wait_ms);
   nlohmann::json Info(const std::string& folder, const std::string& name);
   nlohmann::json Download(const std::string& folder, const std::string& name,

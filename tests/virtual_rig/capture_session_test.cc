@@ -447,7 +447,19 @@ TEST_F(CaptureTest, VerifyNamesEachDamage) {
   expect(replace("rig.json", "led-3", "led-x"), "rig.json: its SHA-256");
   expect(replace("session.json", "\"iso\": 100.0", "\"iso\": 101.0"), "tells of other frames");
   expect(replace("journal.jsonl", "\"iso\":100.0}}", "\"iso\":101.0}}"), "tells of other frames");
-  expect(replace("journal.jsonl", "{\"record\":\"complete\"}\n", ""), "complete");
+  expect(replace("journal.jsonl", "{\"record\":\"complete\"}\n", ""),
+         "go on with it: sateen capture --resume");
+  expect([&] { fs::remove(dir_ / "journal.jsonl"); }, "journal.jsonl: is missing");
+  // Captures of before did not name their journal.
+  fs::remove_all(dir_);
+  ASSERT_TRUE(Begin());
+  Session session = *ReadSessionRecord(dir_);
+  EXPECT_TRUE(session.has_journal);
+  session.has_journal = false;
+  WriteText(dir_ / "session.json", SessionToJson(session));
+  EXPECT_TRUE(VerifySession(dir_, {}));
+  fs::remove(dir_ / "journal.jsonl");
+  EXPECT_TRUE(VerifySession(dir_, {}));
 }
 
 }  // namespace
