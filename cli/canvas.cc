@@ -102,6 +102,10 @@ Rgb8 Captioned(const Rgb8& panel, const std::string& caption) {
   return canvas.Taken();
 }
 
+std::string HeatCaption(const std::string& what, float white, const std::string& unit) {
+  return fmt::format("{}, white = {:.2g}{}{}", what, white, unit.empty() ? "" : " ", unit);
+}
+
 Rgb8 ScaledGrey(const Image<uint8_t>& grey, double factor) {
   const cv::Mat mat(grey.height, grey.width, CV_8UC1, const_cast<uint8_t*>(grey.pixels.data()));
   cv::Mat scaled;

@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 #include <vector>
 
+#include "cli/canvas.h"
 #include "cli/pictures.h"
 #include "imaging/image_io.h"
 
@@ -44,9 +46,18 @@ Rgb8 Overview(const NormalField& field, const Image3& normal, const LightFrame& 
   std::transform(field.reason.pixels.begin(), field.reason.pixels.end(), solved.pixels.begin(),
                  [](uint8_t reason) { return reason == static_cast<uint8_t>(Reason::kSolved); });
   const Image<float>& quality = angular_error_deg ? *angular_error_deg : field.residual;
-  return SideBySide({ShowLinear(first_frame.rgb), ShowNormal(normal), ShowLinear(field.albedo),
-                     ShowHeat(quality, TopOf(quality, solved), solved)},
-                    kPanelWidthPx);
+  const float top = TopOf(quality, solved);
+  const std::string heat = angular_error_deg ? HeatCaption("error from truth", top, "degrees")
+                                             : HeatCaption("residual", top, "");
+  std::vector<Rgb8> panels;
+  for (const auto& [panel, caption] :
+       {std::pair{ShowLinear(first_frame.rgb), std::string("first frame")},
+        std::pair{ShowNormal(normal), std::string("normal")},
+        std::pair{ShowLinear(field.albedo), std::string("albedo")},
+        std::pair{ShowHeat(quality, top, solved), heat}}) {
+    panels.push_back(Captioned(Shrunk(panel, kPanelWidthPx), caption));
+  }
+  return ContactSheet(panels, static_cast<int>(panels.size()));
 }
 
 }  // namespace
