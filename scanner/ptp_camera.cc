@@ -244,8 +244,9 @@ Result<std::optional<double>> PtpCamera::SetNumber(const std::vector<std::string
   }
   std::ranges::sort(choices);
   if (setting.readonly || nearest == nullptr) {
-    return Fail(ErrorCode::kInvalidArgument, "{} at {}: {} {:.4g} cannot be set: it is '{}'{}; {}",
-                info_.model, info_.port, what, wanted, setting.value,
+    return Fail(ErrorCode::kInvalidArgument,
+                "{} at {}: {} {:.4g} cannot be set: the camera's {} is '{}'{}; {}", info_.model,
+                info_.port, what, wanted, setting.name, setting.value,
                 setting.readonly ? " and is set on the camera itself" : "",
                 Neighbours(choices, wanted));
   }
