@@ -119,6 +119,18 @@ Result<OpenDevices> OpenBefore(const CaptureRequest& request, RigDevices& device
 
 }  // namespace
 
+Status CheckCapture(const CaptureRequest& request) {
+  if (!request.resume) {
+    return CaptureSession::CheckBegin(request.output, request.rig, request.options)
+        .map([](const Rig&) {});
+  }
+  return CaptureSession::CheckResume(request.output).and_then([&](const Journal& journal) {
+    return request.new_exposure && journal.complete
+               ? CaptureSession::CompleteSession(request.output)
+               : Status();
+  });
+}
+
 Result<CaptureSummary> RunCapture(const CaptureRequest& request, RigDevices& devices,
                                   const Task& task, const CaptureObserver& observer) {
   if (!request.resume) {

@@ -30,6 +30,9 @@ struct CaptureRequest {
                                                 const Task& task,
                                                 const CaptureObserver& observer = {});
 
+// What it would be refused for before a device is opened: rig, folder, options.
+[[nodiscard]] Status CheckCapture(const CaptureRequest& request);
+
 // What a capture would do, without taking a frame or writing a file: --dry-run.
 struct CaptureForecast {
   CaptureRequest request;

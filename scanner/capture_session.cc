@@ -94,11 +94,10 @@ FramePlan PlanOf(const Rig& rig, const std::vector<double>& exposures_s) {
 }
 
 Session SessionOf(const Journal& journal) {
-  Session session{
-      .kind = journal.begun.kind,
-      .rig = journal.begun.rig,
-      .rig_sha256 = journal.begun.rig_sha256,
-      .has_journal = true};
+  Session session{.kind = journal.begun.kind,
+                  .rig = journal.begun.rig,
+                  .rig_sha256 = journal.begun.rig_sha256,
+                  .has_journal = true};
   for (const std::optional<SessionFrame>& frame : journal.done) {
     SATEEN_CHECK(frame.has_value());
     session.frames.push_back(*frame);
@@ -199,8 +198,7 @@ Result<Journal> CaptureSession::CheckResume(const fs::path& dir) {
 
 Result<CaptureSession> CaptureSession::Resume(const fs::path& dir, const CaptureOptions& options) {
   Status ready = options.Validate().and_then([&] { return CheckResume(dir).map([](Journal) {}); });
-  Result<JournalWriter> writer =
-      ready ? JournalWriter::Open(dir) : tl::unexpected(ready.error());
+  Result<JournalWriter> writer = ready ? JournalWriter::Open(dir) : tl::unexpected(ready.error());
   // Again, now that no other program can go on here.
   Result<Journal> journal = writer ? CheckResume(dir) : tl::unexpected(writer.error());
   Result<Rig> rig = journal ? ReadRig(dir / journal->begun.rig) : tl::unexpected(journal.error());
@@ -213,12 +211,16 @@ Result<CaptureSession> CaptureSession::Resume(const fs::path& dir, const Capture
   return CaptureSession(dir, *std::move(rig), *std::move(journal), *std::move(writer), options);
 }
 
+Status CaptureSession::CompleteSession(const fs::path& dir) {
+  return Fail(ErrorCode::kInvalidArgument,
+              "{}: is a complete session, whose exposure cannot change; capture anew, into another "
+              "folder",
+              dir.string());
+}
+
 Status CaptureSession::ChangeExposure(std::optional<double> exposure_s) {
   if (journal_.complete) {
-    return Fail(ErrorCode::kInvalidArgument,
-                "{}: is a complete session, whose exposure cannot change; capture anew, into "
-                "another folder",
-                dir_.string());
+    return CompleteSession(dir_);
   }
   asked_anew_ = AskedAnew{exposure_s};
   return {};

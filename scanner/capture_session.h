@@ -92,6 +92,7 @@ class CaptureSession {
   // Run() takes every frame again: at this exposure, or at one that it finds. Later runs keep to it.
   // kInvalidArgument: the session is complete.
   [[nodiscard]] Status ChangeExposure(std::optional<double> exposure_s);
+  [[nodiscard]] static Status CompleteSession(const std::filesystem::path& dir);  // that error
 
   [[nodiscard]] const Journal& Record() const { return journal_; }
   [[nodiscard]] const Rig& GetRig() const { return rig_; }
@@ -170,7 +171,7 @@ class CaptureSession {
     std::optional<double> exposure_s;
   };
   std::optional<AskedAnew> asked_anew_;  // until there is a plan for it
-  bool is_clipped_ = false;              // the latest frame that failed, at an exposure given by hand
+  bool is_clipped_ = false;  // the latest frame that failed, at an exposure given by hand
   std::vector<std::optional<FrameLook>> looks_;  // of done frames
   std::optional<std::size_t> brighter_;          // light that the exposures found are too long for
   double peak_ = 0.0;

@@ -50,10 +50,11 @@ Error FromLibrary(const json& error, const std::string& port) {
   } else if (code == kModelNotFound) {
     remedy = "; no camera is there: sateen devices lists them";
   } else if (CardIsFull(error)) {
-    return {ErrorCode::kDevice,
-            fmt::format("camera at {}: the camera's memory card is full; delete files or change the "
-                        "card",
-                        port)};
+    return {
+        ErrorCode::kDevice,
+        fmt::format("camera at {}: the camera's memory card is full; delete files or change the "
+                    "card",
+                    port)};
   }
   return {ErrorCode::kDevice,
           fmt::format("camera at {}: {}: {}{}", port, error.value("while", ""), text, remedy)};

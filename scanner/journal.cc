@@ -282,9 +282,8 @@ Status JournalWriter::Append(const std::string& line) {
     has_failed_ = true;
     // Where that fails too, the rest is a torn last line, which readers drop.
     [[maybe_unused]] const int ignored = ftruncate(fd_, static_cast<off_t>(bytes_));
-    return Fail(ErrorCode::kIo,
-                "{}: cannot write: {}; what was captured before is whole{}", path_.string(),
-                SystemReason(error_number),
+    return Fail(ErrorCode::kIo, "{}: cannot write: {}; what was captured before is whole{}",
+                path_.string(), SystemReason(error_number),
                 error_number == ENOSPC || error_number == EDQUOT ? "; make room" : "");
   }
   bytes_ += line.size();

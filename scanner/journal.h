@@ -20,7 +20,8 @@ struct JournalBegun {
   SessionKind kind = SessionKind::kFabric;
   std::string rig;  // relative to the session's folder
   std::string rig_sha256;
-  std::optional<double> exposure_s;  // as asked of the camera, the latest time; nothing: to be found
+  std::optional<double>
+      exposure_s;  // as asked of the camera, the latest time; nothing: to be found
   double f_number = 8.0;
   double iso = 100.0;
   double level = 1.0;  // of the lights

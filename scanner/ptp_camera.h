@@ -92,7 +92,7 @@ class PtpCamera : public TetheredCamera {
   PtpCameraOptions options_;
   std::optional<WorkerProcess> worker_;
   State state_ = State::kClosed;
-  bool frame_owing_ = false;  // the shutter was released, and no file has come for it
+  bool frame_owing_ = false;   // the shutter was released, and no file has come for it
   bool card_is_full_ = false;  // at the latest capture
   CameraInfo info_;
   const CameraProfile* profile_ = nullptr;

@@ -106,7 +106,8 @@ TEST_F(CaptureCommand, GoesOnWhereItWasStopped) {
 TEST_F(CaptureCommand, AnExposureThatClipsIsNoDeadEnd) {
   args_.exposure = "1s";
   EXPECT_EQ(Run(), 3);
-  EXPECT_THAT(log_.str(), HasSubstr("sateen capture --resume " + dir_.string() + " --exposure auto"));
+  EXPECT_THAT(log_.str(),
+              HasSubstr("sateen capture --resume " + dir_.string() + " --exposure auto"));
   args_.resume = dir_;
   args_.exposure = "";
   EXPECT_EQ(Run(), 3);  // as before
@@ -193,6 +194,15 @@ TEST_F(CaptureCommand, PreviewShowsOneLight) {
   args.light = "led-77";
   EXPECT_EQ(RunPreviewWith(args, *devices_, {}, out_, log_), 3);
   EXPECT_THAT(log_.str(), HasSubstr("no light of that name"));
+}
+
+TEST_F(CaptureCommand, PreviewWritesNothingButJpegs) {
+  PreviewArgs args{.output = temp_.Path() / "look.png", .light = "0"};
+  EXPECT_EQ(RunPreviewWith(args, *devices_, {}, out_, log_), 2);
+  EXPECT_THAT(log_.str(), HasSubstr("look.png: a preview is a JPEG"));
+  EXPECT_FALSE(fs::exists(args.output));
+  args.output = temp_.Path() / "look.JPEG";
+  EXPECT_EQ(RunPreviewWith(args, *devices_, {}, out_, log_), 0) << log_.str();
 }
 
 // What saturates is magenta.

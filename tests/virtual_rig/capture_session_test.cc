@@ -262,7 +262,8 @@ TEST_F(CaptureTest, ACameraThatFailsIsAskedAgainAndThenNamed) {
   EXPECT_EQ(error.code, ErrorCode::kDevice);
   EXPECT_EQ(error.message,
             "frame 2 of 13 (led-0): camera is busy; tried 3 times; then go on: sateen capture "
-            "--resume " + dir_.string());
+            "--resume " +
+                dir_.string());
   const Result<CaptureSummary> resumed = Resume();
   ASSERT_TRUE(resumed) << resumed.error().message;
   EXPECT_EQ(resumed->kept, 1);
@@ -289,8 +290,8 @@ TEST_F(CaptureTest, AFullCardIsNotTriedAgain) {
 TEST_F(CaptureTest, AFullDiskIsNotTriedAgain) {
   camera_.fail_next = {Fail(ErrorCode::kIo, "No space left on device; make room"), Status()};
   const Error error = ErrorOf(Begin());
-  EXPECT_THAT(error, IsError(ErrorCode::kIo, "make room; then go on: sateen capture --resume " +
-                                                 dir_.string()));
+  EXPECT_THAT(error, IsError(ErrorCode::kIo,
+                             "make room; then go on: sateen capture --resume " + dir_.string()));
   EXPECT_EQ(camera_.captures, 2);
   const Result<CaptureSummary> resumed = Resume();
   ASSERT_TRUE(resumed) << resumed.error().message;
@@ -304,11 +305,13 @@ TEST_F(CaptureTest, AnotherExposureTakesEveryFrameAgain) {
   options.exposure_s = 0.4;
   const Error clipped = ErrorOf(Begin(options));
   EXPECT_THAT(clipped, IsError(ErrorCode::kBadData, "frame 2 of 13 (led-0): "));
-  EXPECT_THAT(clipped.message, ::testing::EndsWith("sateen capture --resume " + dir_.string() +
-                                                 " --exposure auto"));
+  EXPECT_THAT(clipped.message,
+              ::testing::EndsWith("sateen capture --resume " + dir_.string() + " --exposure auto"));
   EXPECT_LE(camera_.captures, 3);  // the dark, the clipped one, and the one begun meanwhile
   std::atomic<bool> cancel = false;
-  camera_.on_exposed = [&, until = camera_.captures + 4](int capture) { cancel = capture == until; };
+  camera_.on_exposed = [&, until = camera_.captures + 4](int capture) {
+    cancel = capture == until;
+  };
   {
     Result<CaptureSession> session = CaptureSession::Resume(dir_, QuickCapture());
     ASSERT_TRUE(session && session->ChangeExposure(0.02));
