@@ -1,5 +1,7 @@
 #include "cli/canvas.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <opencv2/core.hpp>
@@ -100,6 +102,10 @@ Rgb8 Captioned(const Rgb8& panel, const std::string& caption) {
   canvas.Place(panel, 0, 0);
   canvas.Text({2.0, panel[0].height + 0.75 * kCaptionPx}, caption, kBlackInk);
   return canvas.Taken();
+}
+
+std::string HeatCaption(const std::string& what, float white, const std::string& unit) {
+  return fmt::format("{}, white = {:.2g}{}{}", what, white, unit.empty() ? "" : " ", unit);
 }
 
 Rgb8 ScaledGrey(const Image<uint8_t>& grey, double factor) {

@@ -47,6 +47,10 @@ class Canvas {
 // The panel with a line of text under it.
 [[nodiscard]] Rgb8 Captioned(const Rgb8& panel, const std::string& caption);
 
+// "residual, white = 0.012"; `unit` stands after the number.
+[[nodiscard]] std::string HeatCaption(const std::string& what, float white,
+                                      const std::string& unit);
+
 // `grey` as large as `width` asks, between pixels linearly, with `factor` = new / old size.
 [[nodiscard]] Rgb8 ScaledGrey(const Image<uint8_t>& grey, double factor);
 

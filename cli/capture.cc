@@ -19,9 +19,10 @@ Result<CaptureRequest> RequestOf(const CaptureArgs& args) {
   request.resume = !args.resume.empty();
   if (request.resume) {
     request.output = args.resume;
+    request.new_exposure = !args.exposure.empty();
   }
   options.kind = args.sheet ? SessionKind::kSheet : SessionKind::kFabric;
-  if (args.exposure != "auto") {
+  if (!args.exposure.empty() && args.exposure != "auto") {
     const Result<double> exposure_s = ParseExposure(args.exposure);
     if (!exposure_s) {
       return tl::unexpected(exposure_s.error());
@@ -76,9 +77,8 @@ int Report(const Error& error, std::ostream& log) {
   return ExitStatus(error);
 }
 
-int DryRun(const CaptureArgs& args, const CaptureRequest& request, RigDevices& devices,
-           std::ostream& out, std::ostream& log) {
-  const Result<CaptureForecast> forecast = ForecastCapture(request, devices);
+int ReportForecast(const CaptureArgs& args, const Result<CaptureForecast>& forecast,
+                   std::ostream& out, std::ostream& log) {
   if (!forecast) {
     return Report(forecast.error(), log);
   }
@@ -118,11 +118,11 @@ void AddCapture(CLI::App& root, CaptureArgs& args) {
   CaptureOptions& options = args.request.options;
   cmd->add_flag("--sheet", args.sheet, "It is a sheet of white paper, to calibrate the lights by")
       ->excludes(resume);
-  cmd->add_option("--exposure", args.exposure,
-                  "Exposure of each frame, as 1/50 or 20ms; auto: by test frames of the brightest "
-                  "light, and several a light where one cannot hold the scene")
-      ->capture_default_str()
-      ->excludes(resume);
+  cmd->add_option(
+      "--exposure", args.exposure,
+      "Exposure of each frame, as 1/50 or 20ms; auto, the default: by test frames of the "
+      "brightest light, and several a light where one cannot hold the scene. With "
+      "--resume: every frame is taken again, at this one");
   cmd->add_option("--aperture", options.f_number, "f-number")
       ->capture_default_str()
       ->excludes(resume);
@@ -180,11 +180,7 @@ int RunCaptureByDaemon(const CaptureArgs& args, const DaemonClient& daemon, cons
     return Report(request.error(), log);
   }
   if (args.dry_run) {
-    return Report({ErrorCode::kDevice,
-                   fmt::format("the daemon at {} has the rig, and a dry run opens board and camera "
-                               "by itself; stop the daemon first",
-                               daemon.Socket().string())},
-                  log);
+    return ReportForecast(args, ForecastByDaemon(daemon, *request), out, log);
   }
   return ReportCapture(args, *request, CaptureByDaemon(daemon, *request, task, ShowOn(task)), task,
                        out, log);
@@ -197,7 +193,7 @@ int RunCaptureWith(const CaptureArgs& args, RigDevices& devices, const Task& tas
     return Report(request.error(), log);
   }
   if (args.dry_run) {
-    return DryRun(args, *request, devices, out, log);
+    return ReportForecast(args, ForecastCapture(*request, devices), out, log);
   }
   return ReportCapture(args, *request, RunCapture(*request, devices, task, ShowOn(task)), task, out,
                        log);

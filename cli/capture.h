@@ -16,7 +16,7 @@ struct CaptureArgs {
   std::filesystem::path resume;  // the session to go on with; empty: a new one
   RigDeviceNames devices;
   bool sheet = false;
-  std::string exposure = "auto";
+  std::string exposure;  // empty: auto, or on resuming as before
   std::string level = "100%";
   std::string settle = "30ms";
   std::string margin = "6s";

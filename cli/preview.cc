@@ -26,7 +26,9 @@ Result<PreviewRequest> PreviewRequestOf(const PreviewArgs& args) {
     return tl::unexpected(level.error());
   }
   request.level = *level;
-  return request.Validate().map([&] { return request; });
+  return request.Validate().and_then([&] { return CheckPreviewName(args.output); }).map([&] {
+    return request;
+  });
 }
 
 int ReportPreview(const PreviewArgs& args, const Result<Preview>& preview, std::ostream& out,
@@ -50,7 +52,10 @@ void AddPreview(CLI::App& root, PreviewArgs& args) {
       "Take one frame and write it as a JPEG to look at: framing, focus, exposure; magenta where "
       "it saturates");
   PreviewRequest& request = args.request;
-  cmd->add_option("-o,--output", args.output, "JPEG file")->capture_default_str();
+  cmd->add_option("-o,--output", args.output,
+                  "JPEG file, .jpg or .jpeg: half the sensor's size, or less where that is wider "
+                  "than --max-width")
+      ->capture_default_str();
   cmd->add_option("--light", args.light,
                   "Name (of --rig) or channel of the light that is on; default: room light alone");
   cmd->add_option("--rig", request.rig, "Rig file: names of lights, white balance");
@@ -75,7 +80,7 @@ int RunPreview(const PreviewArgs& args, const Task& task, std::ostream& out, std
     const Result<PreviewRequest> request =
         daemon ? PreviewRequestOf(args) : tl::unexpected(daemon.error());
     return ReportPreview(args,
-                         request ? PreviewByDaemon(**daemon, *request, args.output)
+                         request ? PreviewByDaemon(**daemon, *request, args.output, task)
                                  : tl::unexpected(request.error()),
                          out, log);
   }

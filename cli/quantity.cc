@@ -38,7 +38,8 @@ Result<double> ParseLevel(std::string_view text) {
       return level;
     }
   }
-  return Fail(ErrorCode::kInvalidArgument, "level '{}'; needs 0% to 100%, as 50% or 0.5", text);
+  return Fail(ErrorCode::kInvalidArgument,
+              "level '{}'; needs 0.1% to 100%, or 0% for off, as 50% or 0.5", text);
 }
 
 Result<std::chrono::milliseconds> ParseDuration(std::string_view text) {

@@ -13,7 +13,7 @@ void AddSession(CLI::App& root, SessionArgs& args) {
   CLI::App* verify = session->add_subcommand(
       "verify",
       "Prove a session whole: its record, its journal and its rig agree, every light has its frame "
-      "and every file its hash; exit status 3 where not");
+      "and every file its hash; exit status 3 where not, with all that is wrong");
   verify->add_option("session", args.verify.session, "Folder of the session")->required();
   verify->add_flag("--json", args.verify.json, "Print JSON");
   AddSessionOverview(*session, args.overview);
@@ -28,24 +28,30 @@ int RunSession(const CLI::App& root, const SessionArgs& args, const Task& task, 
 
 int RunSessionVerify(const SessionVerifyArgs& args, const Task& task, std::ostream& out,
                      std::ostream& log) {
-  const Result<int> verified = VerifySession(args.session, task);
+  const Result<SessionProof> proof = ProveSession(args.session, task);
   task.ClearProgress();
-  if (!verified) {
-    log << "sateen session verify: error: " << verified.error().message << '\n';
-    return ExitStatus(verified.error());
-  }
+  const std::vector<std::string> faults =
+      proof ? proof->faults : std::vector<std::string>{proof.error().message};
+  const int files = proof ? proof->files : 0;
   if (args.json) {
-    out << nlohmann::json{{"schema", "sateen.session.verify/1"},
-                          {"session", args.session.string()},
-                          {"files", *verified},
-                          {"whole", true}}
-               .dump(2)
+    out << nlohmann::ordered_json{{"schema", "sateen.session.verify/1"},
+                                  {"session", args.session.string()},
+                                  {"whole", faults.empty()},
+                                  {"files", files},
+                                  {"faults", faults}}
+               .dump(2, ' ', false, nlohmann::json::error_handler_t::replace)
         << '\n';
-  } else {
+  } else if (faults.empty()) {
     out << fmt::format("{} is whole: {} files are as they were captured\n", args.session.string(),
-                       *verified);
+                       files);
   }
-  return 0;
+  for (const std::string& fault : faults) {
+    log << "sateen session verify: error: " << fault << '\n';
+  }
+  if (!proof) {
+    return ExitStatus(proof.error());
+  }
+  return faults.empty() ? 0 : ExitStatus({ErrorCode::kBadData, ""});
 }
 
 }  // namespace sateen::cli

@@ -1,13 +1,18 @@
 #include "cli/session_overview.h"
 
 #include <algorithm>
+#include <nlohmann/json.hpp>
 #include <ostream>
+#include <set>
+#include <tuple>
 #include <vector>
 
 #include "cli/canvas.h"
 #include "cli/pictures.h"
 #include "cli/quantity.h"
+#include "core/json.h"
 #include "core/output_folder.h"
+#include "core/sha256.h"
 #include "imaging/image_io.h"
 #include "imaging/raw.h"
 #include "rig/rig.h"
@@ -82,14 +87,46 @@ Result<std::vector<Rgb8>> FramePanels(const fs::path& dir, const Session& sessio
   return panels;
 }
 
-// An error or a residual as heat.
-Rgb8 HeatOf(const Image<float>& values) {
+// An error or a residual as heat, with its scale.
+Rgb8 HeatOf(const Image<float>& values, const std::string& what, const std::string& unit) {
   std::vector<float> sorted = values.pixels;
   const auto place =
       sorted.begin() +
       static_cast<std::ptrdiff_t>(kOverviewHeatTop * static_cast<double>(sorted.size() - 1));
   std::nth_element(sorted.begin(), place, sorted.end());
-  return ShowHeat(values, std::max(*place, 1e-6F), Image<uint8_t>(values.width, values.height, 1));
+  const float top = std::max(*place, 1e-6F);
+  const Rgb8 heat = ShowHeat(values, top, Image<uint8_t>(values.width, values.height, 1));
+  return Captioned(Shrunk(heat, kOverviewPanelPx), HeatCaption(what, top, unit));
+}
+
+// solve.json has the hash of every file that the solve read: frames of this session are among them, and
+// as they are now.
+Status CheckMapsAreOf(const Session& session, const SessionOverviewArgs& args) {
+  const fs::path record = args.maps / "solve.json";
+  const Result<std::string> text = ReadFileBytes(record);
+  const Result<nlohmann::json> json =
+      text ? ParseJson(*text, record.string()) : tl::unexpected(text.error());
+  if (!json) {
+    return Fail(json.error().code, "{}; name a folder of maps that sateen solve has written",
+                json.error().message);
+  }
+  std::set<std::string> hashes;
+  const bool has_inputs = json->is_object() && json->contains("inputs");
+  for (const auto& [file, hash] : has_inputs ? (*json)["inputs"].items() : json->items()) {
+    hashes.insert(hash.is_string() ? hash.get<std::string>() : "");
+  }
+  int known = 0;
+  for (const SessionFrame& frame : session.frames) {
+    if (frame.role == FrameRole::kLit) {
+      const Result<std::string> hash = Sha256OfFile(args.session / frame.file);
+      known += hash && hashes.contains(*hash) ? 1 : 0;
+    }
+  }
+  return known > 0 ? Status()
+                   : Fail(ErrorCode::kBadData,
+                          "{}: tells of other frames than those of {}; name the maps of a solve of "
+                          "this session, or solve it again",
+                          record.string(), args.session.string());
 }
 
 Result<std::vector<Rgb8>> MapPanels(const fs::path& maps) {
@@ -103,13 +140,13 @@ Result<std::vector<Rgb8>> MapPanels(const fs::path& maps) {
       add("normal.exr", "normal", [](const Image3& map) { return ShowNormal(map); }).and_then([&] {
         return add("albedo.exr", "albedo", [](const Image3& map) { return ShowLinear(map); });
       });
-  for (const auto& [file, caption] :
-       {std::pair{"residual.exr", "residual"}, std::pair{"uncertainty.exr", "uncertainty"},
-        std::pair{"error.exr", "error from truth"}}) {
+  for (const auto& [file, what, unit] : {std::tuple{"residual.exr", "residual", ""},
+                                         std::tuple{"uncertainty.exr", "uncertainty", "degrees"},
+                                         std::tuple{"error.exr", "error from truth", "degrees"}}) {
     std::error_code ignored;
     if (status && fs::exists(maps / file, ignored)) {
-      status = ReadPhoto(maps / file).map([&, caption = caption](const Photo& map) {
-        panels.push_back(Captioned(Shrunk(HeatOf(map.rgb[0]), kOverviewPanelPx), caption));
+      status = ReadPhoto(maps / file).map([&, what = what, unit = unit](const Photo& map) {
+        panels.push_back(HeatOf(map.rgb[0], what, unit));
       });
     }
   }
@@ -120,6 +157,10 @@ Status WriteOverview(const SessionOverviewArgs& args, const Task& task) {
   const Result<Session> session = ReadSessionRecord(args.session);
   const Result<Rig> rig =
       session ? ReadRig(args.session / session->rig) : tl::unexpected(session.error());
+  const Status ours = session && !args.maps.empty() ? CheckMapsAreOf(*session, args) : Status();
+  if (!ours) {
+    return ours;
+  }
   Result<std::vector<Rgb8>> panels =
       rig ? FramePanels(args.session, *session, rig->response, task) : tl::unexpected(rig.error());
   if (panels && !args.maps.empty()) {

@@ -84,8 +84,8 @@ Result<ExposureSettings> CaptureSession::Configure(double exposure_s, TetheredCa
 Status CaptureSession::MakePlan(Tools& tools) {
   FramePlan plan;
   std::string reason;
-  if (journal_.begun.exposure_s) {
-    plan = PlanOf(rig_, {*journal_.begun.exposure_s});
+  if (const std::optional<double> exposure_s = AskedExposure()) {
+    plan = PlanOf(rig_, {*exposure_s});
     reason = "exposure as asked";
   } else {
     const std::size_t light = brighter_.value_or(BrightestLight(rig_));
@@ -97,7 +97,13 @@ Status CaptureSession::MakePlan(Tools& tools) {
     reason = fmt::format("exposure found with light '{}'", rig_.lights[light].name);
   }
   brighter_.reset();
-  return writer_.Planned(plan, reason).map([&] {
+  PlannedExposure asked;
+  if (asked_anew_) {
+    asked = {.is_new = true, .exposure_s = asked_anew_->exposure_s};
+  }
+  return writer_.Planned(plan, reason, asked).map([&] {
+    journal_.begun.exposure_s = AskedExposure();
+    asked_anew_.reset();
     journal_.plan = std::move(plan);
     journal_.done.assign(journal_.plan.size(), std::nullopt);
     looks_.assign(journal_.plan.size(), std::nullopt);
@@ -120,7 +126,8 @@ Result<SignalLevels> CaptureSession::TakeTestFrame(const Light& light, double ex
     Result<SignalLevels> levels =
         shot ? ReadSignalLevels({.path = shot->file.path, .response = rig_.response})
              : tl::unexpected(shot.error());
-    if (levels || attempt == options_.tries || !MayBeTriedAgain(levels.error().code)) {
+    if (levels || attempt == options_.tries || !MayBeTriedAgain(levels.error().code) ||
+        tools.camera.NeedsAPerson()) {
       return levels;
     }
     if (const Status again = Reopen(levels.error(), tools.camera); !again) {
@@ -188,8 +195,8 @@ Result<CaptureSession::Arrived> CaptureSession::Shoot(std::size_t frame, int att
   arrived.record.iso = set->iso;
   arrived.record.file = FileNameOf(frame, planned, path);
   FrameCheckOptions checks = options_.checks;
-  if (planned.role != FrameRole::kDark && (!IsBase(frame) || !journal_.begun.exposure_s)) {
-    checks.max_saturated = 1.0;  // the shorter exposure has it, or another one is found
+  if (planned.role != FrameRole::kDark || journal_.begun.exposure_s) {
+    checks.max_saturated = 1.0;  // Settle() looks: the shorter exposure has it, or another is found
   }
   arrived.look = std::async(
       std::launch::async,
@@ -214,13 +221,32 @@ Status CaptureSession::Place(const Arrived& arrived, SessionFrame& record) {
   return FlushToDisk(place.parent_path(), place.parent_path());
 }
 
+// At an exposure given by hand nothing would change between tries.
+Status CaptureSession::CheckClipped(std::size_t frame, const SignalLevels& levels) {
+  is_clipped_ = journal_.begun.exposure_s && levels.saturated > options_.checks.max_saturated;
+  if (!is_clipped_) {
+    return {};
+  }
+  return Fail(ErrorCode::kBadData,
+              "{:.2g} % of its sites are saturated at {:.4g} s; at most {:.2g} % may be: {}go on "
+              "with a shorter exposure, or with one that is found: sateen capture --resume {} "
+              "--exposure auto",
+              100.0 * levels.saturated, *journal_.begun.exposure_s,
+              100.0 * options_.checks.max_saturated,
+              LightOf(frame) == nullptr ? "darken the room, or " : "", dir_.string());
+}
+
 Status CaptureSession::Settle(Arrived arrived, Tools& tools) {
   Result<FrameLook> look = arrived.look.get();
+  is_clipped_ = false;
   if (!look) {
     return tl::unexpected(look.error());
   }
   const std::size_t frame = arrived.frame;
   peak_ = look->levels.peak;
+  if (Status clipped = CheckClipped(frame, look->levels); !clipped) {
+    return clipped;
+  }
   if (!journal_.begun.exposure_s && IsBase(frame) && LightOf(frame) != nullptr &&
       look->levels.saturated > options_.checks.max_saturated) {
     brighter_ = static_cast<std::size_t>(LightOf(frame) - rig_.lights.data());
@@ -251,7 +277,7 @@ Status CaptureSession::TakeAgain(Error error, std::size_t frame, int attempt, To
   error.message =
       fmt::format("frame {} of {} ({}): {}{}", frame + 1, journal_.plan.size(), NameOf(frame),
                   error.message, attempt > 1 ? fmt::format("; tried {} times", attempt) : "");
-  if (attempt == options_.tries) {
+  if (attempt == options_.tries || is_clipped_ || tools.camera.NeedsAPerson()) {
     return tl::unexpected(std::move(error));
   }
   return Reopen(error, tools.camera);

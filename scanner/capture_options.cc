@@ -8,7 +8,7 @@ Status CaptureOptions::Validate() const {
     return time >= least && time <= most;
   };
   if (!(level > 0.0 && level <= 1.0)) {
-    return Fail(ErrorCode::kInvalidArgument, "level is {}; need more than 0 and at most 1", level);
+    return Fail(ErrorCode::kInvalidArgument, "level is {:g} %; need 0.1 % to 100 %", 100.0 * level);
   }
   if (exposure_s && !(*exposure_s > 0.0 && *exposure_s <= 60.0)) {
     return Fail(ErrorCode::kInvalidArgument, "exposure_s is {}; need more than 0 and at most 60",

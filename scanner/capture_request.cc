@@ -92,13 +92,19 @@ Result<OpenDevices> OpenFor(const Rig& rig, double level, const CaptureOptions& 
 // With what the journal says on resuming.
 CaptureOptions OptionsOf(const CaptureSession& session, const CaptureRequest& request) {
   CaptureOptions options = request.options;
-  options.exposure_s = session.Record().begun.exposure_s;
+  options.exposure_s = session.AskedExposure();
   return options;
 }
 
 Result<CaptureSession> BeginOrResume(const CaptureRequest& request) {
-  return request.resume ? CaptureSession::Resume(request.output, request.options)
-                        : CaptureSession::Begin(request.output, request.rig, request.options);
+  if (!request.resume) {
+    return CaptureSession::Begin(request.output, request.rig, request.options);
+  }
+  Result<CaptureSession> session = CaptureSession::Resume(request.output, request.options);
+  const Status changed = session && request.new_exposure
+                             ? session->ChangeExposure(request.options.exposure_s)
+                             : Status();
+  return changed ? std::move(session) : tl::unexpected(changed.error());
 }
 
 // Before a folder is made that a capture without devices would leave behind.
@@ -112,6 +118,18 @@ Result<OpenDevices> OpenBefore(const CaptureRequest& request, RigDevices& device
 }
 
 }  // namespace
+
+Status CheckCapture(const CaptureRequest& request) {
+  if (!request.resume) {
+    return CaptureSession::CheckBegin(request.output, request.rig, request.options)
+        .map([](const Rig&) {});
+  }
+  return CaptureSession::CheckResume(request.output).and_then([&](const Journal& journal) {
+    return request.new_exposure && journal.complete
+               ? CaptureSession::CompleteSession(request.output)
+               : Status();
+  });
+}
 
 Result<CaptureSummary> RunCapture(const CaptureRequest& request, RigDevices& devices,
                                   const Task& task, const CaptureObserver& observer) {
@@ -130,7 +148,7 @@ Result<CaptureSummary> RunCapture(const CaptureRequest& request, RigDevices& dev
   const Result<OpenDevices> open = OpenFor(session->GetRig(), session->Record().begun.level,
                                            OptionsOf(*session, request), devices);
   if (!open) {
-    return tl::unexpected(open.error());
+    return tl::unexpected(session->WithNextStep(open.error()));
   }
   Result<CaptureSummary> summary = session->Run(*open->board, *open->camera, task, observer);
   if (!summary) {

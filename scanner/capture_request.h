@@ -17,6 +17,8 @@ struct CaptureRequest {
   std::filesystem::path rig;     // not on resuming: the session has its own
   std::filesystem::path output;  // folder of the session
   bool resume = false;
+  // On resuming: every frame again, at the exposure of `options`, which is found where it has none.
+  bool new_exposure = false;
   CaptureOptions options;
 };
 
@@ -27,6 +29,9 @@ struct CaptureRequest {
 [[nodiscard]] Result<CaptureSummary> RunCapture(const CaptureRequest& request, RigDevices& devices,
                                                 const Task& task,
                                                 const CaptureObserver& observer = {});
+
+// What it would be refused for before a device is opened: rig, folder, options.
+[[nodiscard]] Status CheckCapture(const CaptureRequest& request);
 
 // What a capture would do, without taking a frame or writing a file: --dry-run.
 struct CaptureForecast {

@@ -1,13 +1,10 @@
 #include "scanner/capture_session.h"
 
 #include <algorithm>
-#include <cmath>
 #include <utility>
 
 #include "core/check.h"
-#include "core/file_io.h"
 #include "core/output_folder.h"
-#include "core/sha256.h"
 #include "scanner/folder_listing.h"
 #include "scanner/frame_loader.h"
 
@@ -16,64 +13,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kRigFile = "rig.json";
 constexpr const char* kRecordFile = "session.json";
 constexpr int kRounds = 2;     // of taking again what the checks reject
 constexpr int kMostPlans = 3;  // because a light was brighter than the exposures found
-
-Status MakeFolder(const fs::path& path) {
-  std::error_code error;
-  fs::create_directories(path, error);
-  if (error) {
-    return Fail(ErrorCode::kIo, "{}: cannot create this folder: {}", path.string(),
-                error.message());
-  }
-  return {};
-}
-
-// Each light has a channel of its own, or two frames would be of one light.
-Status CheckLights(const Rig& rig, const fs::path& file) {
-  const Lights& lights = rig.lights;
-  if (lights.empty()) {
-    return Fail(ErrorCode::kBadData, "{}: has no lights; give it their names and channels",
-                file.string());
-  }
-  for (size_t k = 0; k < lights.size(); ++k) {
-    for (size_t j = 0; j < k; ++j) {
-      if (lights[j].channel == lights[k].channel) {
-        return Fail(ErrorCode::kBadData,
-                    "{}: lights '{}' and '{}' both have channel {}; need one each", file.string(),
-                    lights[j].name, lights[k].name, lights[k].channel);
-      }
-    }
-  }
-  return {};
-}
-
-// A journal without a frame that is done has nothing to lose: killed before, or without a camera.
-bool HasFrames(const fs::path& dir) {
-  if (!Exists(dir / kJournalFile)) {
-    return false;
-  }
-  const Result<std::optional<Journal>> journal = ReadJournal(dir);
-  return !journal || (*journal && std::ranges::any_of((*journal)->done, [](const auto& frame) {
-    return frame.has_value();
-  }));
-}
-
-bool IsPlanOf(const Rig& rig, const FramePlan& plan) {
-  std::vector<double> exposures_s;
-  for (const SessionFrame& frame : plan) {
-    if (frame.role == FrameRole::kLit && !rig.lights.empty() &&
-        frame.light == rig.lights.front().name) {
-      exposures_s.push_back(*frame.exposure_s);
-    }
-  }
-  return !exposures_s.empty() &&
-         std::ranges::equal(plan, PlanOf(rig, exposures_s), [](const auto& a, const auto& b) {
-           return a.role == b.role && a.light == b.light && a.exposure_s == b.exposure_s;
-         });
-}
 
 }  // namespace
 
@@ -94,8 +36,10 @@ FramePlan PlanOf(const Rig& rig, const std::vector<double>& exposures_s) {
 }
 
 Session SessionOf(const Journal& journal) {
-  Session session{
-      .kind = journal.begun.kind, .rig = journal.begun.rig, .rig_sha256 = journal.begun.rig_sha256};
+  Session session{.kind = journal.begun.kind,
+                  .rig = journal.begun.rig,
+                  .rig_sha256 = journal.begun.rig_sha256,
+                  .has_journal = true};
   for (const std::optional<SessionFrame>& frame : journal.done) {
     SATEEN_CHECK(frame.has_value());
     session.frames.push_back(*frame);
@@ -113,91 +57,21 @@ CaptureSession::CaptureSession(fs::path dir, Rig rig, Journal journal, JournalWr
       looks_(journal_.done.size()),
       is_new_(journal_.done.size()) {}
 
-Result<Rig> CaptureSession::CheckBegin(const fs::path& dir, const fs::path& rig_file,
-                                       const CaptureOptions& options) {
-  Result<Rig> rig = options.Validate().and_then([&] { return ReadRig(rig_file); });
-  Status status = rig ? CheckLights(*rig, rig_file) : tl::unexpected(rig.error());
-  if (status && (Exists(dir / kRecordFile) || HasFrames(dir))) {
-    status =
-        Fail(ErrorCode::kInvalidArgument,
-             "{}: holds a session already; choose another folder, or go on with it: --resume {}",
-             dir.string(), dir.string());
-  }
-  return status ? std::move(rig) : tl::unexpected(status.error());
+std::optional<double> CaptureSession::AskedExposure() const {
+  return asked_anew_ ? asked_anew_->exposure_s : journal_.begun.exposure_s;
 }
 
-Result<CaptureSession> CaptureSession::Begin(const fs::path& dir, const fs::path& rig_file,
-                                             const CaptureOptions& options) {
-  Result<Rig> rig = CheckBegin(dir, rig_file, options);
-  const Result<std::string> rig_text = rig ? ReadFileBytes(rig_file) : tl::unexpected(rig.error());
-  const Status made = rig_text ? MakeFolder(dir / "frames") : tl::unexpected(rig_text.error());
-  if (!made) {
-    return tl::unexpected(made.error());
+Error CaptureSession::WithNextStep(Error error) const {
+  const std::string command = "sateen capture --resume";
+  if (journal_.complete || error.message.find(command) != std::string::npos) {
+    return error;
   }
-  const fs::path parent = fs::absolute(dir).lexically_normal().parent_path();
-  Result<JournalWriter> writer =
-      FlushToDisk(parent, parent).and_then([&] { return JournalWriter::Open(dir); });
-  if (!writer) {
-    return tl::unexpected(writer.error());
+  if (Open().size() < journal_.done.size()) {
+    error.message += fmt::format("; then go on: {} {}", command, dir_.string());
+  } else if (error.code != ErrorCode::kInvalidArgument) {
+    error.message += "; no frame is kept yet: then give the same command again";
   }
-  // Again, now that no other program can begin here; then what was there goes.
-  const Status ready = CheckBegin(dir, rig_file, options)
-                           .and_then([&](const Rig&) { return writer->Keep(0); })
-                           .and_then([&] { return WriteFileWhole(dir / kRigFile, *rig_text); });
-  if (!ready) {
-    return tl::unexpected(ready.error());
-  }
-  const Journal journal{.begun = {.kind = options.kind,
-                                  .rig = kRigFile,
-                                  .rig_sha256 = Sha256(*rig_text),
-                                  .exposure_s = options.exposure_s,
-                                  .f_number = options.f_number,
-                                  .iso = options.iso,
-                                  .level = options.level,
-                                  .brackets = options.brackets}};
-  if (const Status begun = writer->Begin(journal.begun); !begun) {
-    return tl::unexpected(begun.error());
-  }
-  return CaptureSession(dir, *std::move(rig), journal, *std::move(writer), options);
-}
-
-Result<CaptureSession> CaptureSession::Resume(const fs::path& dir, const CaptureOptions& options) {
-  if (const Status valid = options.Validate(); !valid) {
-    return tl::unexpected(valid.error());
-  }
-  if (!Exists(dir / kJournalFile)) {
-    return Fail(ErrorCode::kIo, "{}: is not there; nothing was captured",
-                (dir / kJournalFile).string());
-  }
-  Result<JournalWriter> writer = JournalWriter::Open(dir);
-  Result<std::optional<Journal>> read = writer ? ReadJournal(dir) : tl::unexpected(writer.error());
-  if (!read) {
-    return tl::unexpected(read.error());
-  }
-  if (!*read) {
-    return Fail(ErrorCode::kBadData, "{}: nothing was captured yet; begin anew, with --rig and -o",
-                dir.string());
-  }
-  Journal journal = **std::move(read);
-  const fs::path rig_file = dir / journal.begun.rig;
-  const Result<std::string> hash = Sha256OfFile(rig_file);
-  Result<Rig> rig = hash ? ReadRig(rig_file) : tl::unexpected(hash.error());
-  if (!rig) {
-    return tl::unexpected(rig.error());
-  }
-  if (*hash != journal.begun.rig_sha256) {
-    return Fail(ErrorCode::kBadData,
-                "{}: is not the rig that this capture began with; restore it, or capture anew",
-                rig_file.string());
-  }
-  if (!journal.plan.empty() && !IsPlanOf(*rig, journal.plan)) {
-    return Fail(ErrorCode::kBadData, "{}: plans other frames than this program takes; capture anew",
-                (dir / kJournalFile).string());
-  }
-  if (const Status kept = writer->Keep(journal.whole_bytes); !kept) {
-    return tl::unexpected(kept.error());
-  }
-  return CaptureSession(dir, *std::move(rig), std::move(journal), *std::move(writer), options);
+  return error;
 }
 
 std::vector<std::size_t> CaptureSession::Open() const {
@@ -384,9 +258,9 @@ Result<CaptureSummary> CaptureSession::Finish() {
 }
 
 Status CaptureSession::TakeAll(Tools& tools) {
-  for (int plans = 0; journal_.plan.empty() || !Open().empty();) {
+  for (int plans = 0; journal_.plan.empty() || asked_anew_ || !Open().empty();) {
     Status done;
-    if (journal_.plan.empty() || brighter_) {
+    if (journal_.plan.empty() || asked_anew_ || brighter_) {
       if (plans++ == kMostPlans) {
         return Fail(ErrorCode::kBadData,
                     "light '{}' is too bright for every exposure that was found; do the lights "
@@ -406,6 +280,14 @@ Status CaptureSession::TakeAll(Tools& tools) {
 Result<CaptureSummary> CaptureSession::Run(LightBoard& board, TetheredCamera& camera,
                                            const Task& task, const CaptureObserver& observer) {
   Tools tools{board, camera, task, observer};
+  Result<CaptureSummary> summary = TakeAndCheck(tools);
+  if (!summary) {
+    summary = tl::unexpected(WithNextStep(std::move(summary.error())));
+  }
+  return summary;
+}
+
+Result<CaptureSummary> CaptureSession::TakeAndCheck(Tools& tools) {
   if (const Status verified = VerifyDone(); !verified) {
     return tl::unexpected(verified.error());
   }

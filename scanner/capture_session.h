@@ -69,8 +69,10 @@ struct CaptureSummary {
 /// says are done and whose hashes still hold are not taken again.
 ///
 /// Errors   kInvalidArgument: options; a folder that holds a session
-///          kBadData: rig or journal; a frame that fails its checks as often as it is tried
+///          kBadData: rig or journal; a frame that fails its checks as often as it is tried, or that is
+///          clipped at an exposure given by hand, which is not tried again
 ///          kDevice, kTimeout: board or camera, after all tries; kIo: the disk; kCancelled
+/// What ends a capture says once how to go on with it.
 /// After any error, and when this goes out of scope, all lights have been told to go off.
 class CaptureSession {
  public:
@@ -85,9 +87,19 @@ class CaptureSession {
   // Of `options` what the journal says is not used: kind, exposure, level.
   [[nodiscard]] static Result<CaptureSession> Resume(const std::filesystem::path& dir,
                                                      const CaptureOptions& options);
+  // Whether Resume() could: what the journal says. Locks and changes nothing.
+  [[nodiscard]] static Result<Journal> CheckResume(const std::filesystem::path& dir);
+  // Run() takes every frame again: at this exposure, or at one that it finds. Later runs keep to it.
+  // kInvalidArgument: the session is complete.
+  [[nodiscard]] Status ChangeExposure(std::optional<double> exposure_s);
+  [[nodiscard]] static Status CompleteSession(const std::filesystem::path& dir);  // that error
 
   [[nodiscard]] const Journal& Record() const { return journal_; }
   [[nodiscard]] const Rig& GetRig() const { return rig_; }
+  // As given by hand; nothing: it is found.
+  [[nodiscard]] std::optional<double> AskedExposure() const;
+  // The error with the command that goes on, where there is one and it does not say so itself.
+  [[nodiscard]] Error WithNextStep(Error error) const;
   // Frames of the plan that are still to be taken.
   [[nodiscard]] std::vector<std::size_t> Open() const;
 
@@ -116,6 +128,7 @@ class CaptureSession {
   CaptureSession(std::filesystem::path dir, Rig rig, Journal journal, JournalWriter writer,
                  const CaptureOptions& options);
 
+  [[nodiscard]] Result<CaptureSummary> TakeAndCheck(Tools& tools);
   [[nodiscard]] Status VerifyDone();
   [[nodiscard]] Status MakePlan(Tools& tools);
   [[nodiscard]] Result<std::vector<double>> Meter(std::size_t light, Tools& tools);
@@ -126,6 +139,7 @@ class CaptureSession {
   [[nodiscard]] Status TakeOpenFrames(Tools& tools);
   [[nodiscard]] Result<Arrived> Shoot(std::size_t frame, int attempt, Tools& tools);
   [[nodiscard]] Status Settle(Arrived arrived, Tools& tools);
+  [[nodiscard]] Status CheckClipped(std::size_t frame, const SignalLevels& levels);
   [[nodiscard]] Status Place(const Arrived& arrived, SessionFrame& record);
   [[nodiscard]] Status TakeAgain(Error error, std::size_t frame, int attempt, Tools& tools);
   [[nodiscard]] Result<ExposureSettings> Configure(double exposure_s, TetheredCamera& camera);
@@ -153,6 +167,11 @@ class CaptureSession {
     ExposureSettings settings;  // as the camera has them
   };
   std::optional<Configured> configured_;
+  struct AskedAnew {
+    std::optional<double> exposure_s;
+  };
+  std::optional<AskedAnew> asked_anew_;  // until there is a plan for it
+  bool is_clipped_ = false;  // the latest frame that failed, at an exposure given by hand
   std::vector<std::optional<FrameLook>> looks_;  // of done frames
   std::optional<std::size_t> brighter_;          // light that the exposures found are too long for
   double peak_ = 0.0;
@@ -169,11 +188,21 @@ inline constexpr const char* kIncoming = ".sateen-incoming";
 // The session that a complete journal tells of.
 [[nodiscard]] Session SessionOf(const Journal& journal);
 
+// What was found of a session on disk.
+struct SessionProof {
+  int files = 0;                    // that are as they were captured
+  std::vector<std::string> faults;  // one sentence each, with what to do; none: it is whole
+};
+
 /// Proves a session on disk whole: session.json, journal and rig agree, each light of the rig has its
-/// frame, and each file has the hash that was recorded. A session without a journal, which no capture
-/// made, is proved by what it records. Returns how many files were hashed.
+/// frame, and each file has the hash that was recorded. A session whose session.json names no journal,
+/// and that has none, was made by no capture, and is proved by what it records.
 ///
-/// Errors   kBadData, kIo: the first thing that is not so
+/// Errors   kIo: there is no such folder; kCancelled
+[[nodiscard]] Result<SessionProof> ProveSession(const std::filesystem::path& dir, const Task& task);
+
+// The same where anything but a whole session is an error, kBadData: all faults, one a line. Returns
+// how many files were hashed.
 [[nodiscard]] Result<int> VerifySession(const std::filesystem::path& dir, const Task& task);
 
 }  // namespace sateen

@@ -101,7 +101,8 @@ class CaptureChecker {
     if (!has_pattern_) {
       check_.notes.emplace_back(
           has_pose ? "the lights are distant ones, which look alike: swapped lights are not found"
-                   : "the rig has no pose of its camera: swapped lights are not found");
+                   : "the rig has no pose of its camera: swapped lights are not found, nor is a "
+                     "shadow on one frame");
     }
   }
 

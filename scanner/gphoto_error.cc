@@ -2,7 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <cerrno>
+#include <filesystem>
 #include <nlohmann/json.hpp>
+
+#include "core/file_io.h"
 
 namespace sateen {
 namespace {
@@ -17,14 +21,25 @@ constexpr int kNoSpace = -115;
 constexpr int kIo = -7;
 constexpr int kUnspecified = -1;
 
+Error OfDisk(int error_number, const std::string& path) {
+  const bool full = error_number == ENOSPC || error_number == EDQUOT;
+  const std::string folder = std::filesystem::path(path).parent_path().string();
+  return {ErrorCode::kIo,
+          fmt::format("{}: cannot write: {}; {}", path, SystemReason(error_number),
+                      full ? "make room" : fmt::format("see that {} can be written to", folder))};
+}
+
+}  // namespace
+
 bool CardIsFull(const json& error) {
   return error.value("code", 0) == kNoSpace ||
          error.value("text", "").find("Store Full") != std::string::npos;
 }
 
-}  // namespace
-
 Error FromLibrary(const json& error, const std::string& port) {
+  if (error.contains("errno")) {
+    return OfDisk(error.value("errno", 0), error.value("path", ""));
+  }
   const int code = error.value("code", 0);
   const std::string text = error.value("text", "");
   std::string remedy = "; see that it is on and connected";
@@ -35,7 +50,11 @@ Error FromLibrary(const json& error, const std::string& port) {
   } else if (code == kModelNotFound) {
     remedy = "; no camera is there: sateen devices lists them";
   } else if (CardIsFull(error)) {
-    remedy = "; the card is full: delete files or put in another";
+    return {
+        ErrorCode::kDevice,
+        fmt::format("camera at {}: the camera's memory card is full; delete files or change the "
+                    "card",
+                    port)};
   }
   return {ErrorCode::kDevice,
           fmt::format("camera at {}: {}: {}{}", port, error.value("while", ""), text, remedy)};

@@ -7,10 +7,14 @@
 
 namespace sateen {
 
-// An error of libgphoto2 as the worker reports it, {"code", "text", "while"}, in words with what to do.
+// An error as the worker reports it, in words with what to do: of libgphoto2, {"code", "text", "while"}, a
+// kDevice; of this computer's disk, {"errno", "path"}, a kIo.
 [[nodiscard]] Error FromLibrary(const nlohmann::json& error, const std::string& port);
 
 // Also where it may be gone: a connection that broke is kUnspecified as often as not.
 [[nodiscard]] bool ConnectionIsGone(const nlohmann::json& error);
+
+// The memory card has no room, which no further try mends.
+[[nodiscard]] bool CardIsFull(const nlohmann::json& error);
 
 }  // namespace sateen

@@ -124,9 +124,14 @@ class JournalReader {
   }
 
   Status TakePlanned(JsonReader& json) {
+    const std::optional<double> exposure_s = json.OptionalNumber("exposure_s");
+    json.Require(exposure_s.value_or(0.0) >= 0.0, "exposure_s", "is below 0");
     Result<FramePlan> plan = ReadPlan(json);
     if (!plan) {
       return tl::unexpected(plan.error());
+    }
+    if (exposure_s) {
+      journal_->begun.exposure_s = *exposure_s > 0.0 ? exposure_s : std::nullopt;
     }
     journal_->plan = *std::move(plan);
     journal_->done.assign(journal_->plan.size(), std::nullopt);
@@ -277,10 +282,9 @@ Status JournalWriter::Append(const std::string& line) {
     has_failed_ = true;
     // Where that fails too, the rest is a torn last line, which readers drop.
     [[maybe_unused]] const int ignored = ftruncate(fd_, static_cast<off_t>(bytes_));
-    return Fail(ErrorCode::kIo,
-                "{}: cannot write: {}; what was captured before is whole: mend it "
-                "and go on with sateen capture --resume",
-                path_.string(), SystemReason(error_number));
+    return Fail(ErrorCode::kIo, "{}: cannot write: {}; what was captured before is whole{}",
+                path_.string(), SystemReason(error_number),
+                error_number == ENOSPC || error_number == EDQUOT ? "; make room" : "");
   }
   bytes_ += line.size();
   return {};
@@ -300,9 +304,13 @@ Status JournalWriter::Begin(const JournalBegun& begun) {
   return Append(LineOf(record));
 }
 
-Status JournalWriter::Planned(const FramePlan& plan, const std::string& reason) {
-  nlohmann::ordered_json record = {
-      {"record", "planned"}, {"reason", reason}, {"plan", nlohmann::ordered_json::array()}};
+Status JournalWriter::Planned(const FramePlan& plan, const std::string& reason,
+                              const PlannedExposure& exposure) {
+  nlohmann::ordered_json record = {{"record", "planned"}, {"reason", reason}};
+  if (exposure.is_new) {
+    record["exposure_s"] = exposure.exposure_s.value_or(0.0);
+  }
+  record["plan"] = nlohmann::ordered_json::array();
   for (const SessionFrame& frame : plan) {
     record["plan"].push_back(RoleAndLightToJson(frame));
     PutIfKnown(record["plan"].back(), "exposure_s", frame.exposure_s);

@@ -20,11 +20,18 @@ struct JournalBegun {
   SessionKind kind = SessionKind::kFabric;
   std::string rig;  // relative to the session's folder
   std::string rig_sha256;
-  std::optional<double> exposure_s;  // as asked of the camera; nothing: to be found
+  std::optional<double>
+      exposure_s;  // as asked of the camera, the latest time; nothing: to be found
   double f_number = 8.0;
   double iso = 100.0;
   double level = 1.0;  // of the lights
   int brackets = 3;    // exposures a light, at most, where they are to be found
+};
+
+// With a plan: whether another exposure than before was asked for; nothing: to be found.
+struct PlannedExposure {
+  bool is_new = false;
+  std::optional<double> exposure_s;
 };
 
 /// journal.jsonl of a session that is being captured, one JSON object a line, each on the disk before
@@ -32,8 +39,10 @@ struct JournalBegun {
 ///
 ///     {"schema": "sateen.journal/1", "record": "begun", "kind", "rig", "rig_sha256", "exposure_s",
 ///      "f_number", "iso", "level", "brackets"}           exposure_s: absent where it is to be found
-///     {"record": "planned", "reason": "...", "plan": [{"role", "light", "exposure_s"}, ...]}
-///                                                       all frames of an earlier plan are open again
+///     {"record": "planned", "reason": "...", "exposure_s", "plan": [{"role", "light", "exposure_s"}, ...]}
+///                                                       all frames of an earlier plan are open again;
+///                                                       exposure_s: from here on instead of begun's, 0
+///                                                       where it is to be found; absent: as before
 ///     {"record": "frame begun", "frame": 3}             3: its place in the plan, from 0
 ///     {"record": "frame done", "frame": 3, "is": {...}}           as in session.json, all keys
 ///     {"record": "frame rejected", "frame": 3, "reason": "..."}   begun or done before
@@ -81,7 +90,8 @@ class JournalWriter {
   ~JournalWriter();
 
   [[nodiscard]] Status Begin(const JournalBegun& begun);
-  [[nodiscard]] Status Planned(const FramePlan& plan, const std::string& reason);
+  [[nodiscard]] Status Planned(const FramePlan& plan, const std::string& reason,
+                               const PlannedExposure& exposure = {});
   [[nodiscard]] Status FrameBegun(std::size_t frame);
   [[nodiscard]] Status FrameDone(std::size_t frame, const SessionFrame& done);
   [[nodiscard]] Status FrameRejected(std::size_t frame, const std::string& reason);

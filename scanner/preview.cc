@@ -11,6 +11,7 @@
 #include "imaging/raw.h"
 #include "rig/rig.h"
 #include "scanner/exposure_search.h"
+#include "scanner/folder_listing.h"
 #include "scanner/lit_exposure.h"
 #include "scanner/sensor_reading.h"
 
@@ -162,6 +163,15 @@ class PreviewShooter {
   const Task& task_;
 };
 
+// Nothing where the request names none.
+Status ReadRigOf(const PreviewRequest& request, std::optional<Rig>& rig) {
+  Status ready = request.Validate();
+  if (ready && !request.rig.empty()) {
+    ready = ReadRig(request.rig).map([&](Rig read) { rig = std::move(read); });
+  }
+  return ready;
+}
+
 }  // namespace
 
 Status PreviewRequest::Validate() const {
@@ -172,12 +182,25 @@ Status PreviewRequest::Validate() const {
       .Validate();
 }
 
+Status CheckPreviewName(const std::filesystem::path& output) {
+  const std::string ending = LowerCase(output.extension().string());
+  return ending == ".jpg" || ending == ".jpeg"
+             ? Status()
+             : Fail(ErrorCode::kInvalidArgument,
+                    "{}: a preview is a JPEG; give it a name that ends in .jpg or .jpeg",
+                    output.string());
+}
+
+Status CheckPreview(const PreviewRequest& request) {
+  std::optional<Rig> rig;
+  return ReadRigOf(request, rig).and_then([&] {
+    return FindLight(request, rig).map([](const std::optional<Light>&) {});
+  });
+}
+
 Result<Preview> TakePreview(const PreviewRequest& request, RigDevices& devices, const Task& task) {
   std::optional<Rig> rig;
-  Status ready = request.Validate();
-  if (ready && !request.rig.empty()) {
-    ready = ReadRig(request.rig).map([&](Rig read) { rig = std::move(read); });
-  }
+  const Status ready = ReadRigOf(request, rig);
   const Result<std::optional<Light>> light =
       ready ? FindLight(request, rig) : tl::unexpected(ready.error());
   if (!light) {

@@ -27,6 +27,11 @@ struct PreviewRequest {
   [[nodiscard]] Status Validate() const;
 };
 
+// kInvalidArgument: the name does not end in .jpg or .jpeg, which is what is written.
+[[nodiscard]] Status CheckPreviewName(const std::filesystem::path& output);
+// What it would be refused for before a device is opened: options, rig, light.
+[[nodiscard]] Status CheckPreview(const PreviewRequest& request);
+
 struct Preview {
   std::string jpeg;  // sRGB, half the sensor's size or less; magenta where it saturates
   ImageSize size_px;

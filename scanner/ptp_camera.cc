@@ -161,6 +161,7 @@ Result<json> PtpCamera::Ask(const json& request, milliseconds longest) {
                     : "; connect anew");
   }
   if (answer->contains("error")) {
+    card_is_full_ = CardIsFull((*answer)["error"]);
     if (ConnectionIsGone((*answer)["error"])) {
       state_ = State::kLost;
     }
@@ -243,8 +244,9 @@ Result<std::optional<double>> PtpCamera::SetNumber(const std::vector<std::string
   }
   std::ranges::sort(choices);
   if (setting.readonly || nearest == nullptr) {
-    return Fail(ErrorCode::kInvalidArgument, "{} at {}: {} {:.4g} cannot be set: it is '{}'{}; {}",
-                info_.model, info_.port, what, wanted, setting.value,
+    return Fail(ErrorCode::kInvalidArgument,
+                "{} at {}: {} {:.4g} cannot be set: the camera's {} is '{}'{}; {}", info_.model,
+                info_.port, what, wanted, setting.name, setting.value,
                 setting.readonly ? " and is set on the camera itself" : "",
                 Neighbours(choices, wanted));
   }
@@ -344,6 +346,7 @@ Result<CapturedFile> PtpCamera::Capture(const fs::path& folder, milliseconds lon
   if (state_ != State::kOpen) {
     return Fail(ErrorCode::kDevice, "the camera is not connected");
   }
+  card_is_full_ = false;
   const Deadline deadline(longest);
   const Result<FileOnCamera> file = Expose(deadline);
   if (!file) {

@@ -45,8 +45,8 @@ struct FoundCamera {
 ///                                                Close -> kClosed
 ///     kLost     Open, Close                      Open begins with a new process      -> kOpen
 ///
-/// A camera that refuses (a setting, a full card, busy to the end of the deadline) stays kOpen. The
-/// connection stays up from Open to Close.
+/// A camera that refuses (a setting, a full card, busy to the end of the deadline) stays kOpen, and so
+/// does one whose file finds no room on this computer's disk; the file stays on its card then. The connection stays up from Open to Close.
 ///
 /// A frame is a file that the camera announces after the shutter was released and not before the
 /// exposure can be over; what is announced earlier is left over from a capture that was given up. A
@@ -67,6 +67,7 @@ class PtpCamera : public TetheredCamera {
   [[nodiscard]] std::vector<double> ExposureTimes() const override { return exposure_times_; }
   [[nodiscard]] Result<CapturedFile> Capture(const std::filesystem::path& folder,
                                              std::chrono::milliseconds deadline) override;
+  [[nodiscard]] bool NeedsAPerson() const override { return card_is_full_; }
   void Close() noexcept override;
 
  private:
@@ -91,7 +92,8 @@ class PtpCamera : public TetheredCamera {
   PtpCameraOptions options_;
   std::optional<WorkerProcess> worker_;
   State state_ = State::kClosed;
-  bool frame_owing_ = false;  // the shutter was released, and no file has come for it
+  bool frame_owing_ = false;   // the shutter was released, and no file has come for it
+  bool card_is_full_ = false;  // at the latest capture
   CameraInfo info_;
   const CameraProfile* profile_ = nullptr;
   std::vector<double> exposure_times_;

@@ -23,6 +23,7 @@ Result<LightBoard*> RigDevices::Board() {
       return tl::unexpected(connected.error());
     }
   }
+  board_has_answered_ = true;
   return &*board_;
 }
 

@@ -32,6 +32,8 @@ class RigDevices {
 
   // Connected; what was lost is connected anew. kDevice: none, or it does not answer.
   [[nodiscard]] Result<LightBoard*> Board();
+  // Whether a board has ever answered: then a light of it may be on.
+  [[nodiscard]] bool BoardHasAnswered() const { return board_has_answered_; }
   // Open; what was lost is opened anew. kDevice: none, or it cannot be used, and how to mend it.
   [[nodiscard]] Result<TetheredCamera*> Camera();
   // So that Camera() opens it anew: after an error that may have been its own.
@@ -48,6 +50,7 @@ class RigDevices {
  private:
   RigDeviceNames names_;
   std::optional<LightBoard> board_;
+  bool board_has_answered_ = false;
   std::unique_ptr<TetheredCamera> camera_;
   std::optional<CameraInfo> camera_info_;
 };

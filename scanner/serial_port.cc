@@ -199,10 +199,13 @@ Result<std::string> FindBoardPort() {
     }
   }
   if (found.empty()) {
-    return Fail(ErrorCode::kDevice,
-                "no LED board: none of {} serial ports has the USB id of an Arduino Uno or Nano; "
-                "plug it in, or name its port with --port or SATEEN_PORT",
-                ports->size());
+    return Fail(
+        ErrorCode::kDevice,
+        "no LED board: {} the USB id of an Arduino Uno or Nano; plug it in, or name its port "
+        "with --port or SATEEN_PORT",
+        ports->empty()       ? "there is no serial port, so none with"
+        : ports->size() == 1 ? fmt::format("{} has not", ports->front().name)
+                             : fmt::format("none of {} serial ports has", ports->size()));
   }
   if (found.size() > 1) {
     return Fail(ErrorCode::kDevice,

@@ -13,6 +13,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr const char* kJournalName = "journal.jsonl";
+
 // With a factor known for some frames only, the others would come out in another unit.
 Status CheckFactors(const std::vector<SessionFrame>& frames, const std::string& where) {
   using Factor = std::pair<const char*, std::optional<double> SessionFrame::*>;
@@ -33,13 +35,13 @@ Status CheckFactors(const std::vector<SessionFrame>& frames, const std::string& 
 }
 
 Status CheckFileThere(const fs::path& dir) {
-  if (Exists(dir / "session.json") || !Exists(dir / "journal.jsonl")) {
+  if (Exists(dir / "session.json") || !Exists(dir / kJournalName)) {
     return {};
   }
   return Fail(ErrorCode::kBadData,
               "{}: found journal.jsonl but no session.json: the capture was not completed; "
-              "complete it or capture again",
-              dir.string());
+              "go on with it: sateen capture --resume {}",
+              dir.string(), dir.string());
 }
 
 Result<Session> FromJson(const nlohmann::json& file, const std::string& where) {
@@ -50,6 +52,11 @@ Result<Session> FromJson(const nlohmann::json& file, const std::string& where) {
   session.rig_sha256 = ReadHash(json, "rig_sha256");
   session.table_from_sheet = ReadTransform(json, "table_from_sheet");
   session.mask = json.OptionalString("mask");
+  if (const std::optional<std::string> journal = json.OptionalString("journal")) {
+    json.Require(*journal == kJournalName, "journal",
+                 fmt::format("is \"{}\"; need \"{}\"", *journal, kJournalName));
+    session.has_journal = true;
+  }
   std::vector<JsonReader> frames = json.Objects("frames");
   json.Require(!frames.empty(), "frames", "is empty; need at least one frame");
   if (const Status status = json.Finish(); !status) {
@@ -106,6 +113,9 @@ std::string SessionToJson(const Session& session) {
     json["table_from_sheet"] = RowMajor(*session.table_from_sheet);
   }
   PutIfKnown(json, "mask", session.mask);
+  if (session.has_journal) {
+    json["journal"] = kJournalName;
+  }
   // A file name that is not UTF-8 must not end the run; reading will say that it is not there.
   return json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
 }

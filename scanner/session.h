@@ -54,7 +54,8 @@ struct SessionFrame {
 ///         "iso": 100,                       optional, likewise
 ///         "shift_px": [0.31, -0.12]}],      optional: right, down; at most 100 each
 ///      "table_from_sheet": [16 numbers],    optional: rigid, row-major, millimetres
-///      "mask": "mask.png"}                  optional: relative to the session's folder
+///      "mask": "mask.png",                  optional: relative to the session's folder
+///      "journal": "journal.jsonl"}          of a capture: what proves it, beside this file
 struct Session {
   SessionKind kind = SessionKind::kFabric;
   std::string rig;
@@ -62,6 +63,7 @@ struct Session {
   std::vector<SessionFrame> frames;
   std::optional<Eigen::Isometry3d> table_from_sheet;
   std::optional<std::string> mask;
+  bool has_journal = false;  // a capture made it, with a journal
 };
 
 /// Reads session.json in `dir`.

@@ -59,6 +59,9 @@ class TetheredCamera {
   [[nodiscard]] virtual Result<CapturedFile> Capture(const std::filesystem::path& folder,
                                                      std::chrono::milliseconds deadline) = 0;
 
+  // Whether the latest Capture() failed by what no further try mends, but a person: a full card.
+  [[nodiscard]] virtual bool NeedsAPerson() const { return false; }
+
   virtual void Close() noexcept = 0;
 };
 

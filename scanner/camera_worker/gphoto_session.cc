@@ -2,10 +2,13 @@
 
 #include <fcntl.h>
 #include <gphoto2/gphoto2.h>
+#include <unistd.h>
 
+#include <cerrno>
 #include <chrono>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <string_view>
 #include <thread>
 #include <vector>
 
@@ -23,6 +26,9 @@ struct Freer {
 using WidgetPtr = std::unique_ptr<CameraWidget, Freer<CameraWidget, gp_widget_free>>;
 using FilePtr = std::unique_ptr<CameraFile, Freer<CameraFile, gp_file_unref>>;
 using ListPtr = std::unique_ptr<CameraList, Freer<CameraList, gp_list_free>>;
+
+// A card with less has no room for another RAW file. [KB]
+constexpr uint64_t kLeastRoomKb = 64ULL * 1024;
 
 int MillisecondsSince(steady_clock::time_point start) {
   return static_cast<int>(
@@ -67,6 +73,25 @@ int FindAbilities(const std::string& port, GPPortInfoList* ports, GPContext* con
   }
   gp_abilities_list_free(all);
   return code;
+}
+
+// The errno of creating or writing the file; 0 where all of it is there.
+int WriteNewFile(const std::string& path, std::string_view bytes) {
+  const int descriptor = open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+  if (descriptor < 0) {
+    return errno;
+  }
+  int failed = 0;
+  while (!bytes.empty() && failed == 0) {
+    const ssize_t count = write(descriptor, bytes.data(), bytes.size());
+    failed = count < 0 && errno != EINTR ? errno : 0;
+    bytes.remove_prefix(count > 0 ? static_cast<size_t>(count) : 0);
+  }
+  // Over a network the disk may say only now that it is full.
+  if (close(descriptor) != 0 && failed == 0) {
+    failed = errno;
+  }
+  return failed;
 }
 
 }  // namespace
@@ -242,6 +267,23 @@ json GphotoSession::Set(const std::string& name, const std::string& value) {
   return code < GP_OK ? Failure(code, "setting " + name + " to " + value) : json::object();
 }
 
+// Of some cameras libgphoto2 says nothing but that a capture has failed: Nikon's.
+bool GphotoSession::CardHasRoom() {
+  CameraStorageInformation* raw = nullptr;
+  int count = 0;
+  if (gp_camera_get_storageinfo(camera_, &raw, &count, context_) < GP_OK) {
+    return true;  // nothing is known
+  }
+  const std::unique_ptr<CameraStorageInformation, decltype(&std::free)> owner(raw, &std::free);
+  bool known = false;
+  bool room = false;
+  for (int k = 0; k < count; ++k) {
+    known |= (raw[k].fields & GP_STORAGEINFO_FREESPACEKBYTES) != 0;
+    room |= raw[k].freekbytes >= kLeastRoomKb;
+  }
+  return room || !known;
+}
+
 json GphotoSession::Trigger(int wait_ms) {
   const auto start = steady_clock::now();
   while (true) {
@@ -251,7 +293,12 @@ json GphotoSession::Trigger(int wait_ms) {
       return {{"after_ms", after_ms}};
     }
     if (code != GP_ERROR_CAMERA_BUSY || MillisecondsSince(start) >= wait_ms) {
-      return Failure(code, "taking a frame");
+      json failure = Failure(code, "taking a frame");
+      if (code == GP_ERROR && !CardHasRoom()) {
+        failure["error"]["code"] = GP_ERROR_NO_SPACE;
+      }
+      words_.clear();
+      return failure;
     }
     words_.clear();
     std::this_thread::sleep_for(milliseconds(20));
@@ -289,17 +336,28 @@ json GphotoSession::Info(const std::string& folder, const std::string& name) {
   return {{"bytes", info.file.size}};
 }
 
+// By way of memory, because the library keeps to itself why it cannot write a file.
 json GphotoSession::Download(const std::string& folder, const std::string& name,
                              const std::string& path) {
-  const int descriptor = open(path.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
   CameraFile* raw = nullptr;
-  if (descriptor < 0 || gp_file_new_from_fd(&raw, descriptor) < GP_OK) {
-    return Failure(GP_ERROR_IO_WRITE, "creating " + path);
+  if (const int code = gp_file_new(&raw); code < GP_OK) {
+    return Failure(code, "downloading " + name);
   }
-  const FilePtr file(raw);  // closes the descriptor
-  const int code = gp_camera_file_get(camera_, folder.c_str(), name.c_str(), GP_FILE_TYPE_NORMAL,
-                                      file.get(), context_);
-  return code < GP_OK ? Failure(code, "downloading " + name) : json::object();
+  const FilePtr file(raw);
+  int code = gp_camera_file_get(camera_, folder.c_str(), name.c_str(), GP_FILE_TYPE_NORMAL,
+                                file.get(), context_);
+  const char* bytes = nullptr;
+  unsigned long size = 0;
+  if (code >= GP_OK) {
+    code = gp_file_get_data_and_size(file.get(), &bytes, &size);
+  }
+  if (code < GP_OK) {
+    return Failure(code, "downloading " + name);
+  }
+  if (const int failed = WriteNewFile(path, {bytes, size}); failed != 0) {
+    return {{"error", {{"errno", failed}, {"path", path}}}};
+  }
+  return json::object();
 }
 
 json GphotoSession::Delete(const std::string& folder, const std::string& name) {

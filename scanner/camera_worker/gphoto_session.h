@@ -14,7 +14,8 @@ namespace sateen {
 // block for ever; whoever waits kills this process then.
 //
 // Each request {"do": ...} has one answer. Where it fails that is {"error": {"code", "text",
-// "while"}}, code as libgphoto2 has it.
+// "while"}}, code as libgphoto2 has it; {"error": {"errno", "path"}} where a file of this computer cannot
+// be written, which is not the camera's fault.
 //
 //     do        fields                     answer
 //     list                                 cameras [{model, port}]
@@ -42,6 +43,7 @@ class GphotoSession {
   nlohmann::json Get(const std::string& name);
   nlohmann::json Set(const std::string& name, const std::string& value);
   nlohmann::json Trigger(int wait_ms);
+  bool CardHasRoom();
   nlohmann::json Await(int wait_ms);
   nlohmann::json Info(const std::string& folder, const std::string& name);
   nlohmann::json Download(const std::string& folder, const std::string& name,

@@ -94,10 +94,11 @@ std::string_view Name(ErrorCode code) {
 
 std::string BusyText(const JobRecord& holder) {
   return fmt::format(
-      "the rig is in use: {}{}{} by {} since {} (job {}); wait for its end, or cancel it: DELETE "
-      "/v1/jobs/{}",
+      "the rig is in use: {}{}{} by {} since {} (job {}); wait for its end, or end it: Ctrl-C "
+      "where "
+      "it was started, or sateen light off",
       holder.kind, holder.what.empty() ? "" : " of ", holder.what, holder.owner,
-      TimeText(holder.since), holder.id, holder.id);
+      TimeText(holder.since), holder.id);
 }
 
 std::string StateJson(const RigState& state, const std::string& version) {
@@ -247,6 +248,39 @@ Result<CaptureSummary> SummaryFromJson(const std::string& text) {
     summary.check.shifts.push_back({.px = {shifts[k], shifts[k + 1]}});
   }
   return Answered(json, std::move(summary));
+}
+
+std::string ForecastToJson(const CaptureForecast& forecast) {
+  return OneLine({{"frames", forecast.plan.size()},
+                  {"exposure_known", forecast.exposure_known},
+                  {"port", forecast.port},
+                  {"firmware", forecast.firmware},
+                  {"camera", forecast.camera.model},
+                  {"camera_port", forecast.camera.port},
+                  {"profile", forecast.camera.profile},
+                  {"exposure_s", forecast.settings.exposure_s},
+                  {"f_number", forecast.settings.f_number},
+                  {"iso", forecast.settings.iso},
+                  {"bytes", forecast.bytes},
+                  {"free_bytes", forecast.free_bytes}});
+}
+
+Result<CaptureForecast> ForecastFromJson(const std::string& text) {
+  const Result<nlohmann::json> parsed = ParseAnswer(text);
+  if (!parsed) {
+    return tl::unexpected(parsed.error());
+  }
+  JsonReader json(*parsed, std::string(kAnswer));
+  json.Ignore("frames");
+  CaptureForecast forecast{
+      .exposure_known = json.Boolean("exposure_known"),
+      .port = json.String("port"),
+      .firmware = json.String("firmware"),
+      .camera = {json.String("camera"), json.String("camera_port"), json.String("profile")},
+      .settings = {json.Number("exposure_s"), json.Number("f_number"), json.Number("iso")},
+      .bytes = static_cast<std::uintmax_t>(json.Number("bytes")),
+      .free_bytes = static_cast<std::uintmax_t>(json.Number("free_bytes"))};
+  return Answered(json, std::move(forecast));
 }
 
 std::string PreviewJson(const Preview& preview, const std::filesystem::path& output) {

@@ -41,6 +41,10 @@ namespace sateen {
 // The session is not filled in.
 [[nodiscard]] Result<CaptureSummary> SummaryFromJson(const std::string& text);
 
+// Request and plan are not in it: who asks knows them.
+[[nodiscard]] std::string ForecastToJson(const CaptureForecast& forecast);
+[[nodiscard]] Result<CaptureForecast> ForecastFromJson(const std::string& text);
+
 // Without the picture; where it was written, if it was.
 [[nodiscard]] std::string PreviewJson(const Preview& preview, const std::filesystem::path& output);
 [[nodiscard]] Result<Preview> PreviewAnswerFromJson(const std::string& text);

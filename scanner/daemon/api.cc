@@ -108,6 +108,10 @@ int HttpStatus(ErrorCode code) {
   return 500;
 }
 
+ApiResponse RefusedUnbegun(const Error& error) {
+  return Refused(error.code == ErrorCode::kInvalidArgument ? 400 : 422, error);
+}
+
 Api::Api(RigService& service, ApiOptions options)
     : service_(service), options_(std::move(options)) {}
 
@@ -160,10 +164,43 @@ ApiResponse Api::GetJobs(const ApiRequest& /*request*/, Parameter /*none*/) cons
   return {.body = JobsJson(service_.Jobs())};
 }
 
+std::optional<ApiResponse> Api::CannotBegin(const Status& checked) const {
+  // Who has the rig matters more, and is the answer of Begin().
+  return checked || service_.State().job ? std::nullopt
+                                         : std::optional(RefusedUnbegun(checked.error()));
+}
+
 ApiResponse Api::PostJob(const ApiRequest& request, Parameter /*none*/) const {
+  if (KindOfJob(request.body) == "preview") {
+    return PostPreviewJob(request);
+  }
   const Result<PostedCapture> posted = CaptureFromJson(request.body, options_.capture);
-  return posted ? Begin(CaptureJob(posted->request, OwnerName(posted->client, request.who)))
-                : Refused(400, posted.error());
+  if (!posted) {
+    return Refused(400, posted.error());
+  }
+  if (auto refused = CannotBegin(CheckCapture(posted->request))) {
+    return *std::move(refused);
+  }
+  std::string owner = OwnerName(posted->client, request.who);
+  return posted->dry_run ? RunToEnd(ForecastJob(posted->request, std::move(owner)))
+                         : Begin(CaptureJob(posted->request, std::move(owner)));
+}
+
+ApiResponse Api::PostPreviewJob(const ApiRequest& request) const {
+  const Result<PostedPreview> posted = PreviewFromJson(request.body);
+  if (!posted) {
+    return Refused(400, posted.error());
+  }
+  if (posted->output.empty()) {
+    return Refused(400, {ErrorCode::kInvalidArgument,
+                         "request: output: is missing; need the file of the picture, an absolute "
+                         "path, or POST /v1/preview, which answers with the picture"});
+  }
+  if (auto refused = CannotBegin(CheckPreview(posted->request))) {
+    return *std::move(refused);
+  }
+  return Begin(
+      PreviewJob(posted->request, posted->output, nullptr, OwnerName(posted->client, request.who)));
 }
 
 ApiResponse Api::GetJob(const ApiRequest& /*request*/, Parameter id) const {
@@ -214,6 +251,9 @@ ApiResponse Api::PostPreview(const ApiRequest& request, Parameter /*none*/) cons
   if (!posted) {
     return Refused(400, posted.error());
   }
+  if (auto refused = CannotBegin(CheckPreview(posted->request))) {
+    return *std::move(refused);
+  }
   const auto jpeg = std::make_shared<std::string>();
   ApiResponse response = RunToEnd(
       PreviewJob(posted->request, posted->output, jpeg, OwnerName(posted->client, request.who)));
@@ -232,8 +272,22 @@ ApiResponse Api::PostLight(const ApiRequest& request, Parameter channel) const {
                     fmt::format("'{}' is no number of a light; need 0, 1, ... or off", channel)});
   }
   const Result<PostedLight> posted = LightFromJson(request.body, *number);
-  return posted ? Begin(LightJob(posted->request, OwnerName(posted->client, request.who)))
-                : Refused(400, posted.error());
+  if (!posted) {
+    return Refused(400, posted.error());
+  }
+  // A board that nobody has asked yet is asked first.
+  if (!service_.State().board) {
+    if (ApiResponse asked = RunToEnd(BoardJob({}, request.who)); asked.status != 200) {
+      return asked;
+    }
+  }
+  const std::optional<KnownBoard> board = service_.State().board;
+  if (board && *number >= board->lights) {
+    return Refused(
+        400, {ErrorCode::kInvalidArgument,
+              fmt::format("light {}: the board has lights 0 to {}", *number, board->lights - 1)});
+  }
+  return Begin(LightJob(posted->request, OwnerName(posted->client, request.who)));
 }
 
 ApiResponse Api::Begin(JobRequest job) const {

@@ -36,6 +36,8 @@ struct ApiResponse {
 [[nodiscard]] ApiResponse Refused(int status, const Error& error);
 // 400, 422, 500, 503 or 504.
 [[nodiscard]] int HttpStatus(ErrorCode code);
+// Of what a request names and a job could not begin with: 400, or 422 where it is a file.
+[[nodiscard]] ApiResponse RefusedUnbegun(const Error& error);
 
 struct ApiOptions {
   std::string version;
@@ -70,6 +72,9 @@ class Api {
   [[nodiscard]] ApiResponse PostPreview(const ApiRequest& request, Parameter none) const;
   [[nodiscard]] ApiResponse PostLight(const ApiRequest& request, Parameter channel) const;
 
+  [[nodiscard]] ApiResponse PostPreviewJob(const ApiRequest& request) const;
+  // What the job would end with at once; nothing where it may begin or another has the rig.
+  [[nodiscard]] std::optional<ApiResponse> CannotBegin(const Status& checked) const;
   [[nodiscard]] ApiResponse Begin(JobRequest job) const;     // 202, or 409
   [[nodiscard]] ApiResponse RunToEnd(JobRequest job) const;  // 200, 409, or the job's error
 

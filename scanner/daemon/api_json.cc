@@ -126,6 +126,10 @@ Status CheckPosted(const CaptureRequest& request) {
                 request.resume ? "is given with resume; a session has its own: leave it out"
                                : "is missing; need a rig file, an absolute path");
   }
+  if (request.new_exposure && !request.resume) {
+    return Fail(ErrorCode::kInvalidArgument,
+                "request: new_exposure: is given without resume; a new session has one anyway");
+  }
   const Status valid = request.options.Validate();
   return valid ? Status{} : Fail(ErrorCode::kInvalidArgument, "request: {}", valid.error().message);
 }
@@ -140,6 +144,12 @@ ordered_json FromClient(const std::string& client) {
 
 }  // namespace
 
+std::string KindOfJob(const std::string& text) {
+  const nlohmann::json json = nlohmann::json::parse(text, nullptr, /*allow_exceptions=*/false);
+  const bool says = json.is_object() && json.contains("kind") && json["kind"].is_string();
+  return says ? json["kind"].get<std::string>() : "";
+}
+
 Result<PostedCapture> CaptureFromJson(const std::string& text, const CaptureOptions& defaults) {
   const Result<nlohmann::json> parsed = ParseRequest(text);
   if (!parsed) {
@@ -147,12 +157,14 @@ Result<PostedCapture> CaptureFromJson(const std::string& text, const CaptureOpti
   }
   JsonReader json(*parsed, std::string(kWhere));
   const std::string kind = json.String("kind");
-  json.Require(kind == "capture", "kind", fmt::format("is '{}'; need capture", kind));
+  json.Require(kind == "capture", "kind", fmt::format("is '{}'; need capture or preview", kind));
   PostedCapture posted = {.client = ReadClient(json), .request = {.options = defaults}};
   CaptureRequest& request = posted.request;
   request.rig = ReadPath(json, "rig");
   request.output = ReadPath(json, "output");
   request.resume = TakeFlag(json, "resume");
+  request.new_exposure = TakeFlag(json, "new_exposure");
+  posted.dry_run = TakeFlag(json, "dry_run");
   ReadCaptureOptions(json, request.options);
   std::optional<JsonReader> checks = json.OptionalObject("checks");
   for (const auto& [key, member] : kChecks) {
@@ -170,7 +182,7 @@ Result<PostedCapture> CaptureFromJson(const std::string& text, const CaptureOpti
   return status ? Result<PostedCapture>(std::move(posted)) : tl::unexpected(status.error());
 }
 
-std::string CaptureToJson(const CaptureRequest& request, const std::string& client) {
+std::string CaptureToJson(const CaptureRequest& request, const std::string& client, bool dry_run) {
   const CaptureOptions& options = request.options;
   ordered_json json = FromClient(client);
   json["kind"] = "capture";
@@ -179,6 +191,8 @@ std::string CaptureToJson(const CaptureRequest& request, const std::string& clie
   }
   json["output"] = request.output.string();
   json["resume"] = request.resume;
+  json["new_exposure"] = request.new_exposure;
+  json["dry_run"] = dry_run;
   json["session_kind"] = Name(options.kind);
   if (options.exposure_s) {
     json["exposure_s"] = *options.exposure_s;
@@ -198,12 +212,18 @@ std::string CaptureToJson(const CaptureRequest& request, const std::string& clie
 }
 
 Result<PostedPreview> PreviewFromJson(const std::string& text) {
-  const Result<nlohmann::json> parsed = ParseRequest(text);
+  Result<nlohmann::json> parsed = ParseRequest(text);
   if (!parsed) {
     return tl::unexpected(parsed.error());
   }
+  // A channel may be a number.
+  if (parsed->contains("light") && (*parsed)["light"].is_number_integer()) {
+    (*parsed)["light"] = (*parsed)["light"].dump();
+  }
   JsonReader json(*parsed, std::string(kWhere));
   PostedPreview posted = {.client = ReadClient(json)};
+  const std::string kind = json.OptionalString("kind").value_or("preview");
+  json.Require(kind == "preview", "kind", fmt::format("is '{}'; need preview", kind));
   PreviewRequest& request = posted.request;
   request.rig = ReadPath(json, "rig");
   posted.output = ReadPath(json, "output");
@@ -217,12 +237,16 @@ Result<PostedPreview> PreviewFromJson(const std::string& text) {
   if (status) {
     status = request.Validate();
   }
+  if (status && !posted.output.empty()) {
+    status = CheckPreviewName(posted.output);
+  }
   return status ? Result<PostedPreview>(std::move(posted)) : tl::unexpected(status.error());
 }
 
 std::string PreviewToJson(const PreviewRequest& request, const std::filesystem::path& output,
                           const std::string& client) {
   ordered_json json = FromClient(client);
+  json["kind"] = "preview";
   if (!request.rig.empty()) {
     json["rig"] = request.rig.string();
   }

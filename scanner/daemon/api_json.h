@@ -18,11 +18,15 @@ namespace sateen {
 struct PostedCapture {
   std::string client;
   CaptureRequest request;
+  bool dry_run = false;  // only what it would do
 };
+// "capture" or "preview"; empty where the text does not say.
+[[nodiscard]] std::string KindOfJob(const std::string& text);
 // What the text does not say is as in `defaults`.
 [[nodiscard]] Result<PostedCapture> CaptureFromJson(const std::string& text,
                                                     const CaptureOptions& defaults);
-[[nodiscard]] std::string CaptureToJson(const CaptureRequest& request, const std::string& client);
+[[nodiscard]] std::string CaptureToJson(const CaptureRequest& request, const std::string& client,
+                                        bool dry_run = false);
 
 struct PostedPreview {
   std::string client;

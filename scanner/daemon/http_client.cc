@@ -256,11 +256,28 @@ Result<CaptureSummary> CaptureByDaemon(const DaemonClient& daemon, const Capture
   return summary;
 }
 
+Result<CaptureForecast> ForecastByDaemon(const DaemonClient& daemon,
+                                         const CaptureRequest& request) {
+  CaptureRequest absolute = request;
+  absolute.rig = Absolute(request.rig);
+  absolute.output = Absolute(request.output);
+  Result<CaptureForecast> forecast =
+      daemon.Ask("POST", "/v1/jobs", CaptureToJson(absolute, "", /*dry_run=*/true))
+          .and_then(ForecastFromJson);
+  const Result<Rig> rig = forecast ? ReadRig(request.rig) : tl::unexpected(forecast.error());
+  if (!rig) {
+    return tl::unexpected(rig.error());
+  }
+  forecast->request = request;
+  forecast->plan = PlanOf(*rig, {request.options.exposure_s.value_or(1.0)});
+  return forecast;
+}
+
 Result<Preview> PreviewByDaemon(const DaemonClient& daemon, const PreviewRequest& request,
-                                const std::filesystem::path& output) {
+                                const std::filesystem::path& output, const Task& task) {
   PreviewRequest absolute = request;
   absolute.rig = Absolute(request.rig);
-  return daemon.Ask("POST", "/v1/preview", PreviewToJson(absolute, Absolute(output), ""))
+  return daemon.RunJob("/v1/jobs", PreviewToJson(absolute, Absolute(output), ""), {}, task)
       .and_then(PreviewAnswerFromJson);
 }
 

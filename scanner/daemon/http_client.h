@@ -53,10 +53,14 @@ class DaemonClient {
                                                      const CaptureRequest& request,
                                                      const Task& task,
                                                      const CaptureObserver& observer = {});
+// ForecastCapture by the daemon.
+[[nodiscard]] Result<CaptureForecast> ForecastByDaemon(const DaemonClient& daemon,
+                                                       const CaptureRequest& request);
 // TakePreview by the daemon, into the file `output`; the answer has no picture.
 [[nodiscard]] Result<Preview> PreviewByDaemon(const DaemonClient& daemon,
                                               const PreviewRequest& request,
-                                              const std::filesystem::path& output);
+                                              const std::filesystem::path& output,
+                                              const Task& task);
 // KeepLightOn by the daemon. kCancelled: somebody else turned it off.
 [[nodiscard]] Result<bool> KeepLightOnByDaemon(const DaemonClient& daemon,
                                                const LightRequest& request, const Task& task,

@@ -108,7 +108,14 @@ Result<Listener> Listener::OnUnixSocket(const std::filesystem::path& path) {
   Listener listener;
   listener.lock_ = open((path.native() + ".lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600);
   if (listener.lock_ < 0) {
-    return Fail(ErrorCode::kIo, "{}.lock: cannot be made: {}", path.string(), SystemReason(errno));
+    const int reason = errno;
+    return Fail(
+        ErrorCode::kIo, "{}.lock: cannot be made: {}{}", path.string(), SystemReason(reason),
+        reason == ENOENT
+            ? fmt::format("; make the folder first: mkdir -p {}, or name a socket elsewhere: "
+                          "--socket",
+                          path.parent_path().string())
+            : "; name a socket elsewhere: --socket");
   }
   Status status =
       flock(listener.lock_, LOCK_EX | LOCK_NB) == 0 ? RemoveStale(path, address) : InUse(path);

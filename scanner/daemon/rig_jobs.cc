@@ -114,6 +114,15 @@ JobRequest CaptureJob(CaptureRequest request, std::string owner) {
       .work = [request = std::move(request)](JobContext& job) { return DoCapture(request, job); }};
 }
 
+JobRequest ForecastJob(CaptureRequest request, std::string owner) {
+  return {.kind = "dry run",
+          .what = request.output.string(),
+          .owner = std::move(owner),
+          .work = [request = std::move(request)](JobContext& job) {
+            return ForecastCapture(request, job.Devices()).map(ForecastToJson);
+          }};
+}
+
 JobRequest PreviewJob(PreviewRequest request, std::filesystem::path output,
                       std::shared_ptr<std::string> jpeg, std::string owner) {
   return {.kind = "preview",

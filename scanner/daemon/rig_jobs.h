@@ -15,6 +15,8 @@ namespace sateen {
 
 // Result: SummaryJson. Progress: EventJson.
 [[nodiscard]] JobRequest CaptureJob(CaptureRequest request, std::string owner);
+// Result: ForecastJson. No light goes on.
+[[nodiscard]] JobRequest ForecastJob(CaptureRequest request, std::string owner);
 // Result: PreviewJson; the picture goes to `output`, or where that is empty into `jpeg`.
 [[nodiscard]] JobRequest PreviewJob(PreviewRequest request, std::filesystem::path output,
                                     std::shared_ptr<std::string> jpeg, std::string owner);

@@ -21,12 +21,10 @@ class RigService::Context : public JobContext {
   RigDevices& Devices() override { return *service_.devices_; }
   const Task& GetTask() const override { return task_; }
   void Report(std::string json) override {
-    service_.board_was_asked_ = true;
     const std::lock_guard lock(service_.mutex_);
     service_.Append(job_, "progress", std::move(json));
   }
   void Lit(std::vector<int> channels) override {
-    service_.board_was_asked_ = true;
     const std::lock_guard lock(service_.mutex_);
     service_.lit_ = std::move(channels);
   }
@@ -199,14 +197,13 @@ std::string RigService::ConfirmLightsOff() {
   std::string fault;
   for (int tries = 0; tries < 2; ++tries) {
     const Result<LightBoard*> board = devices_->Board();
-    if (!board && !board_was_asked_) {
+    if (!board && !devices_->BoardHasAnswered()) {
       return {};  // nothing of this daemon's can be on
     }
     if (!board) {
       fault = board.error().message;
       continue;
     }
-    board_was_asked_ = true;
     const Result<BoardState> off = (*board)->AllOff();
     if (off && off->lit == 0) {
       const BoardInfo& info = (*board)->Info();

@@ -108,7 +108,6 @@ class RigService {
   [[nodiscard]] Job* Known(std::uint64_t id) const;           // with the mutex held
 
   std::unique_ptr<RigDevices> devices_;  // of the job thread alone
-  bool board_was_asked_ = false;         // of the job thread alone
 
   mutable std::mutex mutex_;  // for all below
   mutable std::condition_variable changed_;

@@ -98,7 +98,10 @@ Result<RigLoop::Environment> PreloadEnvironment(const VirtualPort& port) {
 
 Result<int> RunCommand(const RigArgs& args, RigLoop& loop, RigCommands& commands,
                        const RigLoop::Environment& environment) {
-  const Result<pid_t> child = StartCommand(args.command, environment);
+  // A daemon that runs on this computer has a real rig, and must not get the command's jobs.
+  RigLoop::Environment of_command = environment;
+  of_command["SATEEN_SOCKET"] = "";
+  const Result<pid_t> child = StartCommand(args.command, of_command);
   if (!child) {
     return tl::unexpected(child.error());
   }

@@ -43,10 +43,12 @@ uint32_t At(const std::vector<uint32_t>& parameters, size_t index) {
   return index < parameters.size() ? parameters[index] : 0;
 }
 
-std::string StorageInfo() {
+std::string StorageInfo(bool is_full) {
   ptp::Writer writer;
   writer.Put(uint16_t{4}).Put(uint16_t{3}).Put(uint16_t{0});  // removable, DCIM, read and write
-  writer.Put(uint64_t{64} << 30).Put(uint64_t{60} << 30).Put(uint32_t{9999});
+  writer.Put(uint64_t{64} << 30)
+      .Put(is_full ? uint64_t{4} << 20 : uint64_t{60} << 30)
+      .Put(uint32_t{is_full ? 0U : 9999U});
   return writer.String("SD").String("").Bytes();
 }
 
@@ -120,7 +122,7 @@ VirtualCamera::Answer VirtualCamera::Handle(uint16_t operation,
     case ptp::kGetStorageIds:
       return Data(ptp::Writer().Array(std::vector<uint32_t>{kStore}).Bytes());
     case ptp::kGetStorageInfo:
-      return Data(StorageInfo());
+      return Data(StorageInfo(card_is_full_));
     case ptp::kInitiateCapture:
     case ptp::kNikonCaptureToMemory:
     case ptp::kNikonCaptureToMedia:
@@ -243,6 +245,7 @@ VirtualCamera::Answer VirtualCamera::InitiateCapture(uint32_t transaction) {
     fault = faults_.front();
     faults_.pop_front();
   }
+  card_is_full_ = fault == CameraFault::kCardFull;
   switch (fault) {
     case CameraFault::kBusy:
       return Refuse(ptp::kDeviceBusy);

@@ -142,6 +142,7 @@ class VirtualCamera {
   uint32_t next_handle_;
   bool asleep_ = false;
   bool exposing_ = false;
+  bool card_is_full_ = false;  // at the latest capture that was asked for
   std::condition_variable stopped_;
   bool off_ = false;
   std::thread shutter_;

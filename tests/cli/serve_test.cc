@@ -144,6 +144,12 @@ TEST(Serve, TcpNeedsATokenFileOfModeSixHundred) {
   EXPECT_FALSE(std::filesystem::exists(socket));
 }
 
+TEST(Serve, SaysWhatToDoWhereTheSocketHasNoFolder) {
+  const RunResult refused = Serve({"--socket", "/nowhere/sateen/s.sock"});
+  EXPECT_EQ(refused.exit_status, 4);
+  EXPECT_THAT(refused.log, HasSubstr("mkdir -p /nowhere/sateen"));
+}
+
 TEST(Serve, ASecondDaemonIsRefused) {
   Serving daemon;
   const RunResult second = Serve({"--socket", daemon.Socket().string()});

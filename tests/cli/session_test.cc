@@ -2,6 +2,8 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
+
 #include "core/sha256.h"
 #include "tests/cli/cli_runner.h"
 #include "tests/scanner/captures.h"
@@ -53,7 +55,6 @@ TEST(SessionVerify, ExitsWith3AndNamesWhatIsNot) {
     EXPECT_EQ(result.out, "");
     EXPECT_THAT(result.log, HasSubstr(part));
   };
-  expect("session.json");  // no such folder
   WriteHashed(dir);
   testing::WriteFlat(dir / "frames" / "west.exr", 0.5F);
   expect("west.exr: its SHA-256");
@@ -65,6 +66,31 @@ TEST(SessionVerify, ExitsWith3AndNamesWhatIsNot) {
   session.frames.erase(session.frames.begin());
   testing::WriteText(dir / "session.json", SessionToJson(session));
   expect("has no frame of light 'east'");
+}
+
+TEST(SessionVerify, TellsOfAllFaultsAtOnce) {
+  const TempFolder temp;
+  const std::filesystem::path dir = temp.Path() / "linen";
+  WriteHashed(dir);
+  testing::WriteFlat(dir / "frames" / "west.exr", 0.5F);
+  std::filesystem::remove(dir / "frames" / "east.exr");
+  const RunResult text = Verify({dir.string()});
+  EXPECT_EQ(std::ranges::count(text.log, '\n'), 2);
+  EXPECT_THAT(text.log, HasSubstr("west.exr: its SHA-256"));
+  EXPECT_THAT(text.log, HasSubstr("east.exr"));
+  const RunResult json = Verify({dir.string(), "--json"});
+  EXPECT_EQ(json.exit_status, 3);
+  EXPECT_EQ(json.Json()["whole"], false);
+  EXPECT_EQ(json.Json()["files"], 3);
+  EXPECT_EQ(json.Json()["faults"].size(), 2U);
+}
+
+TEST(SessionVerify, AFolderThatIsNotThereIsExitStatus4) {
+  const RunResult result = Verify({"/nowhere/linen", "--json"});
+  EXPECT_EQ(result.exit_status, 4);
+  EXPECT_THAT(result.log, HasSubstr("/nowhere/linen: there is no such folder"));
+  EXPECT_EQ(result.Json()["whole"], false);
+  EXPECT_EQ(result.Json()["faults"].size(), 1U);
 }
 
 TEST(SessionVerify, NeedsASession) { EXPECT_EQ(Verify({}).exit_status, 2); }

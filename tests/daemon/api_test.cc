@@ -7,7 +7,9 @@
 
 #include "scanner/daemon/api_json.h"
 #include "scanner/daemon/device_list.h"
+#include "simulation/rigs.h"
 #include "tests/daemon/daemon_fakes.h"
+#include "tests/testing/files.h"
 
 namespace sateen {
 namespace {
@@ -55,7 +57,8 @@ TEST(Api, ALightIsAJobOfItsOwn) {
                                        R"({"level": 0.25, "for_ms": 700, "client": "photo desk"})");
   ASSERT_EQ(begun.status, 202) << begun.body;
   daemon.service.WaitIdle(kLong);
-  const json job = Body(daemon.Ask("GET", "/v1/jobs/1"));
+  const json job =
+      Body(daemon.Ask("GET", fmt::format("/v1/jobs/{}", Body(begun)["id"].get<std::uint64_t>())));
   EXPECT_EQ(job["state"], "done") << job;
   EXPECT_EQ(job["owner"], "photo desk (a test)");
   ASSERT_EQ(daemon.rig.board.lights_set.size(), 1U);
@@ -243,6 +246,75 @@ TEST(Api, WrongBodiesAre400AndNameTheKey) {
     EXPECT_THAT(Message(refused), HasSubstr(says)) << body;
   }
   EXPECT_TRUE(daemon.service.Jobs().empty());
+}
+
+// In the words of the command line, and without a job.
+TEST(Api, AJobThatCannotBeginIsRefusedAtOnce) {
+  const testing::TempFolder folder;
+  const std::string dir = folder.Path().string();
+  testing::WriteText(folder.Path() / "bad.json", "{}");
+  testing::WriteText(folder.Path() / "rig.json", RigToJson(RingRig({96, 64}, LightModel::kLed)));
+  std::filesystem::create_directory(folder.Path() / "full");
+  testing::WriteText(folder.Path() / "full" / "session.json", "{}");
+  FakeDaemon daemon;
+  EXPECT_EQ(daemon.Ask("GET", "/v1/board").status, 200);
+  const std::size_t jobs = daemon.service.Jobs().size();
+  const auto capture = [&](const std::string& rig, const std::string& output) {
+    return fmt::format(R"({{"kind":"capture","rig":"{0}/{1}","output":"{0}/{2}"}})", dir, rig,
+                       output);
+  };
+  for (const auto& [path, body, status, says] :
+       std::vector<std::tuple<std::string, std::string, int, std::string>>{
+           {"/v1/jobs", capture("none.json", "s"), 422, "none.json"},
+           {"/v1/jobs", capture("bad.json", "s"), 422, "bad.json"},
+           {"/v1/jobs", capture("rig.json", "full"), 400, "holds a session already"},
+           {"/v1/jobs", R"({"kind":"capture","resume":true,"output":")" + dir + R"("})", 422,
+            "nothing was captured"},
+           {"/v1/jobs", R"({"kind":"preview","light":3})", 400, "output"},
+           {"/v1/preview", R"({"rig":")" + dir + R"(/none.json"})", 422, "none.json"},
+           {"/v1/preview", R"({"light":"led-3"})", 422, "led-3"},
+           {"/v1/preview", R"({"output":"/tmp/look.png"})", 400, ".jpg"},
+           {"/v1/lights/14", "{}", 400, "the board has lights 0 to 13"}}) {
+    const ApiResponse refused = daemon.Ask("POST", path, body);
+    EXPECT_EQ(refused.status, status) << body << refused.body;
+    EXPECT_THAT(Message(refused), HasSubstr(says)) << body;
+  }
+  EXPECT_EQ(daemon.service.Jobs().size(), jobs);
+}
+
+// Also the first light of all: the board is asked how many it has.
+TEST(Api, ALightThatTheBoardHasNotIsRefusedByAnIdleDaemon) {
+  FakeDaemon daemon;
+  EXPECT_EQ(daemon.Ask("POST", "/v1/lights/14").status, 400);
+  EXPECT_TRUE(daemon.rig.board.lights_set.empty());
+}
+
+TEST(Api, ADryRunTellsWhatACaptureWouldDo) {
+  const testing::TempFolder folder;
+  testing::WriteText(folder.Path() / "rig.json", RigToJson(RingRig({96, 64}, LightModel::kLed)));
+  FakeDaemon daemon;
+  CaptureRequest request = {.rig = folder.Path() / "rig.json", .output = folder.Path() / "twill"};
+  request.options.exposure_s = 0.02;
+  request.options.level = 0.5;  // as this board allows
+  const ApiResponse answer =
+      daemon.Ask("POST", "/v1/jobs", CaptureToJson(request, "", /*dry_run=*/true));
+  ASSERT_EQ(answer.status, 200) << answer.body;
+  EXPECT_EQ(Body(answer)["frames"], 13);
+  const Result<CaptureForecast> forecast = ForecastFromJson(answer.body);
+  ASSERT_TRUE(forecast) << forecast.error().message;
+  EXPECT_TRUE(forecast->exposure_known);
+  EXPECT_EQ(forecast->firmware, "fakefake");
+  EXPECT_EQ(forecast->camera.model, "fake camera");
+  EXPECT_EQ(forecast->settings.exposure_s, 0.02);
+  EXPECT_GT(forecast->bytes, 0U);
+  EXPECT_FALSE(std::filesystem::exists(request.output));
+}
+
+TEST(ApiJson, AnIntegerNamesTheLightOfAPreview) {
+  const Result<PostedPreview> posted = PreviewFromJson(R"({"light": 3})");
+  ASSERT_TRUE(posted) << posted.error().message;
+  EXPECT_EQ(posted->request.light, "3");
+  EXPECT_FALSE(PreviewFromJson(R"({"light": 3.5})"));
 }
 
 TEST(ApiJson, ACaptureSurvivesThereAndBack) {

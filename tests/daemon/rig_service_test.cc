@@ -97,6 +97,18 @@ TEST(RigService, AJobThatLosesTheBoardIsReportedUntilTheBoardHasConfirmed) {
   EXPECT_EQ(daemon.service.State().board->firmware, "fakefake");
 }
 
+// A preview tells of nothing before it ends, and yet has lit a light.
+TEST(RigService, AFirstJobThatReportsNothingAndLosesTheBoardIsAFault) {
+  FakeDaemon daemon;
+  daemon.rig.held = false;  // the link waits for a lost board
+  ASSERT_TRUE(daemon.service.RunToEnd(WorkJob([&](JobContext& job) -> Result<std::string> {
+    EXPECT_TRUE((*job.Devices().Board())->SetLight(2, 0.5, std::chrono::seconds(10)));
+    daemon.rig.board.Unplug();
+    return Fail(ErrorCode::kDevice, "lost");
+  })));
+  EXPECT_THAT(daemon.service.State().lights_fault, HasSubstr("did not confirm"));
+}
+
 TEST(RigService, WithoutABoardNothingIsWrongWithTheLights) {
   FakeDaemon daemon;
   daemon.rig.board.plugged = false;

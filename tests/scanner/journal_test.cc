@@ -77,6 +77,21 @@ Error FailureOfLines(const std::vector<std::string>& lines) {
   return journal ? Error{ErrorCode::kDevice, ""} : journal.error();
 }
 
+// The latest exposure that was asked for counts, until another is.
+TEST(Journal, APlanMayChangeTheExposureThatIsAskedFor) {
+  const TempFolder temp;
+  Result<JournalWriter> writer = JournalWriter::Open(temp.Path());
+  ASSERT_TRUE(writer && writer->Begin(Begun()) && writer->Planned(Planned(), "as asked"));
+  const auto asked = [&] { return (*ReadJournal(temp.Path()))->begun.exposure_s; };
+  EXPECT_EQ(asked(), 0.1);
+  ASSERT_TRUE(writer->Planned(Planned(), "anew", {.is_new = true, .exposure_s = 0.05}));
+  EXPECT_EQ(asked(), 0.05);
+  ASSERT_TRUE(writer->Planned(Planned(), "a brighter light"));
+  EXPECT_EQ(asked(), 0.05);
+  ASSERT_TRUE(writer->Planned(Planned(), "anew", {.is_new = true}));
+  EXPECT_EQ(asked(), std::nullopt);
+}
+
 TEST(Journal, GivesBackWhatWasWritten) {
   const TempFolder temp;
   {

@@ -92,14 +92,30 @@ TEST_F(CaptureCommand, GoesOnWhereItWasStopped) {
   EXPECT_THAT(log_.str(), HasSubstr("--resume " + dir_.string()));
   NewDevices();
   EXPECT_EQ(Run(), 2);
-  EXPECT_THAT(log_.str(), HasSubstr("holds a session already"));
+  EXPECT_THAT(log_.str(), HasSubstr("go on with it: sateen capture --resume " + dir_.string()));
   args_.resume = dir_;
+  args_.exposure = "";
   ASSERT_EQ(Run(), 0) << log_.str();
   EXPECT_THAT(out_.str(), HasSubstr("13 frames, 9 taken"));
   EXPECT_THAT(out_.str(), HasSubstr("4 kept from before"));
   devices_.emplace(RigDeviceNames{.port = "/dev/none", .camera = "folder:/none"});
   ASSERT_EQ(Run(), 0) << log_.str();
   EXPECT_THAT(out_.str(), HasSubstr("0 taken"));
+}
+
+TEST_F(CaptureCommand, AnExposureThatClipsIsNoDeadEnd) {
+  args_.exposure = "1s";
+  EXPECT_EQ(Run(), 3);
+  EXPECT_THAT(log_.str(),
+              HasSubstr("sateen capture --resume " + dir_.string() + " --exposure auto"));
+  args_.resume = dir_;
+  args_.exposure = "";
+  EXPECT_EQ(Run(), 3);  // as before
+  args_.exposure = "auto";
+  ASSERT_EQ(Run(), 0) << log_.str();
+  EXPECT_THAT(out_.str(), HasSubstr("13 frames, 13 taken"));
+  EXPECT_EQ(Run(), 2);
+  EXPECT_THAT(log_.str(), HasSubstr("is a complete session"));
 }
 
 TEST_F(CaptureCommand, ADryRunTakesAndWritesNothing) {
@@ -178,6 +194,15 @@ TEST_F(CaptureCommand, PreviewShowsOneLight) {
   args.light = "led-77";
   EXPECT_EQ(RunPreviewWith(args, *devices_, {}, out_, log_), 3);
   EXPECT_THAT(log_.str(), HasSubstr("no light of that name"));
+}
+
+TEST_F(CaptureCommand, PreviewWritesNothingButJpegs) {
+  PreviewArgs args{.output = temp_.Path() / "look.png", .light = "0"};
+  EXPECT_EQ(RunPreviewWith(args, *devices_, {}, out_, log_), 2);
+  EXPECT_THAT(log_.str(), HasSubstr("look.png: a preview is a JPEG"));
+  EXPECT_FALSE(fs::exists(args.output));
+  args.output = temp_.Path() / "look.JPEG";
+  EXPECT_EQ(RunPreviewWith(args, *devices_, {}, out_, log_), 0) << log_.str();
 }
 
 // What saturates is magenta.

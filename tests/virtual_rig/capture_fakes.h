@@ -64,6 +64,7 @@ class LitCamera : public TetheredCamera {
   std::vector<double> times_s;                  // that it says it has
   // Whether the picture gets brighter with the exposure time; 20 ms is what the images are for.
   bool exposure_counts = false;
+  bool needs_a_person = false;  // what it says after a failure
   int captures = 0;
   int opened = 0;
 
@@ -103,6 +104,7 @@ class LitCamera : public TetheredCamera {
     }
     return CapturedFile{.path = path, .name_on_camera = path.filename()};
   }
+  [[nodiscard]] bool NeedsAPerson() const override { return needs_a_person; }
   void Close() noexcept override {}
 
  private:

@@ -4,6 +4,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <cerrno>
 
 #include "core/file_io.h"
@@ -23,10 +24,15 @@ struct Plan {
 };
 Plan* plan = nullptr;  // null: calls are let through; else in memory shared with the parent
 
+// A frame is flushed by another thread than the one that writes the journal.
+int Passed(int& count) { return std::atomic_ref(count).fetch_add(1); }
+
 // Whether the process is killed here.
-bool Kills() { return plan != nullptr && plan->point++ == plan->at && plan->fault == Fault::kKill; }
+bool Kills() {
+  return plan != nullptr && Passed(plan->point) == plan->at && plan->fault == Fault::kKill;
+}
 bool DiskIsFull() {
-  return plan != nullptr && plan->write++ == plan->at && plan->fault == Fault::kFullDisk;
+  return plan != nullptr && Passed(plan->write) == plan->at && plan->fault == Fault::kFullDisk;
 }
 
 [[noreturn]] void Die() {

@@ -133,6 +133,24 @@ TEST_F(CaptureProgram, AFaultOfTheCameraCostsAFrameAtMost) {
   ExpectWhole();
 }
 
+// Ctrl-C in the middle of an exposure that a daemon takes; then a dry run beside the daemon, which is idle.
+TEST_F(CaptureProgram, PreviewByADaemonHearsCtrlC) {
+  const std::string look = (folder_.Path() / "look.jpg").string();
+  WriteText(folder_.Path() / "daemon.sh",
+            "export SATEEN_SOCKET=" + (folder_.Path() / "s.sock").string() + "\n" +  //
+                kSateen + " serve & daemon=$!\n" +
+                "unset SATEEN_CAMERA SATEEN_PORT\n" +
+                "while ! [ -S $SATEEN_SOCKET ]; do sleep 0.05; done\n" +
+                "timeout --preserve-status -s INT 2 " + kSateen + " preview -o " + look +
+                " --light 3 --exposure 6s\n" + "echo preview ended with $?\n" +
+                Capture("--exposure 1/50 --dry-run") + "\n" + "kill $daemon; wait $daemon\n");
+  const ShellResult ended = OnRig("", "sh " + (folder_.Path() / "daemon.sh").string());
+  EXPECT_THAT(ended.out, HasSubstr("preview ended with 6"));
+  EXPECT_THAT(ended.out, HasSubstr("could capture 13 frames"));
+  EXPECT_FALSE(fs::exists(look));
+  ExpectAllLightsOff();
+}
+
 TEST_F(CaptureProgram, NamesTheLightsThatWereSwapped) {
   const ShellResult captured = OnRig("--fault 'swap led-2 led-7'", Capture("--exposure 1/50"));
   EXPECT_EQ(captured.exit_status, 3) << captured.out;

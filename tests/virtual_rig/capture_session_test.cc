@@ -17,6 +17,7 @@ namespace {
 namespace fs = std::filesystem;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using ::testing::Not;
 using ::testing::SizeIs;
 
 class CaptureTest : public BoardTest {
@@ -258,11 +259,95 @@ TEST_F(CaptureTest, ACameraThatFailsIsAskedAgainAndThenNamed) {
   fs::remove_all(dir_);
   camera_.fail_next = {busy, busy, busy, Status()};
   const Error error = ErrorOf(Begin());
-  EXPECT_THAT(error, IsError(ErrorCode::kDevice, "frame 2 of 13 (led-0): camera is busy; tried 3"));
+  EXPECT_EQ(error.code, ErrorCode::kDevice);
+  EXPECT_EQ(error.message,
+            "frame 2 of 13 (led-0): camera is busy; tried 3 times; then go on: sateen capture "
+            "--resume " +
+                dir_.string());
   const Result<CaptureSummary> resumed = Resume();
   ASSERT_TRUE(resumed) << resumed.error().message;
   EXPECT_EQ(resumed->kept, 1);
   EXPECT_EQ(resumed->taken, 12);
+}
+
+TEST_F(CaptureTest, WithoutAFrameTheSameCommandDoes) {
+  const Status busy = Fail(ErrorCode::kDevice, "camera is busy");
+  camera_.fail_next = {busy, busy, busy};
+  const Error error = ErrorOf(Begin());
+  EXPECT_THAT(error, IsError(ErrorCode::kDevice, "give the same command again"));
+  EXPECT_THAT(error.message, Not(HasSubstr("--resume")));
+  EXPECT_TRUE(Begin());
+}
+
+TEST_F(CaptureTest, AFullCardIsNotTriedAgain) {
+  camera_.fail_next = {Fail(ErrorCode::kDevice, "card is full"), Status()};
+  camera_.needs_a_person = true;
+  EXPECT_THAT(ErrorOf(Begin()), IsError(ErrorCode::kDevice, "card is full; then go on: "));
+  EXPECT_EQ(camera_.captures, 2);
+  EXPECT_EQ(camera_.opened, 0);
+}
+
+TEST_F(CaptureTest, AFullDiskIsNotTriedAgain) {
+  camera_.fail_next = {Fail(ErrorCode::kIo, "No space left on device; make room"), Status()};
+  const Error error = ErrorOf(Begin());
+  EXPECT_THAT(error, IsError(ErrorCode::kIo,
+                             "make room; then go on: sateen capture --resume " + dir_.string()));
+  EXPECT_EQ(camera_.captures, 2);
+  const Result<CaptureSummary> resumed = Resume();
+  ASSERT_TRUE(resumed) << resumed.error().message;
+  EXPECT_EQ(resumed->kept, 1);
+}
+
+// An exposure that clips is no dead end: another one, and plain resumes keep to it.
+TEST_F(CaptureTest, AnotherExposureTakesEveryFrameAgain) {
+  camera_.exposure_counts = true;
+  CaptureOptions options = QuickCapture();
+  options.exposure_s = 0.4;
+  const Error clipped = ErrorOf(Begin(options));
+  EXPECT_THAT(clipped, IsError(ErrorCode::kBadData, "frame 2 of 13 (led-0): "));
+  EXPECT_THAT(clipped.message,
+              ::testing::EndsWith("sateen capture --resume " + dir_.string() + " --exposure auto"));
+  EXPECT_LE(camera_.captures, 3);  // the dark, the clipped one, and the one begun meanwhile
+  std::atomic<bool> cancel = false;
+  camera_.on_exposed = [&, until = camera_.captures + 4](int capture) {
+    cancel = capture == until;
+  };
+  {
+    Result<CaptureSession> session = CaptureSession::Resume(dir_, QuickCapture());
+    ASSERT_TRUE(session && session->ChangeExposure(0.02));
+    EXPECT_EQ(session->AskedExposure(), 0.02);
+    EXPECT_EQ(ErrorOf(session->Run(*host_, camera_, {.threads = 1, .cancel = &cancel})).code,
+              ErrorCode::kCancelled);
+  }
+  camera_.on_exposed = {};
+  const Result<CaptureSummary> resumed = Resume();
+  ASSERT_TRUE(resumed) << resumed.error().message;
+  EXPECT_EQ(resumed->kept, 4);
+  for (const SessionFrame& frame : resumed->session.frames) {
+    EXPECT_EQ(frame.exposure_s, 0.02);
+  }
+  EXPECT_TRUE(VerifySession(dir_, {}));
+  Result<CaptureSession> complete = CaptureSession::Resume(dir_, QuickCapture());
+  ASSERT_TRUE(complete);
+  EXPECT_THAT(complete->ChangeExposure(0.01).error(),
+              IsError(ErrorCode::kInvalidArgument, "is a complete session"));
+}
+
+TEST_F(CaptureTest, AnExposureThatIsFoundInsteadOfOneByHand) {
+  camera_.exposure_counts = true;
+  CaptureOptions options = QuickCapture();
+  options.exposure_s = 0.4;
+  ASSERT_FALSE(Begin(options));
+  for (double time_s = 0.0005; time_s < 2.0; time_s *= 1.2) {
+    camera_.times_s.push_back(time_s);
+  }
+  Result<CaptureSession> session = CaptureSession::Resume(dir_, QuickCapture());
+  ASSERT_TRUE(session && session->ChangeExposure(std::nullopt));
+  const Result<CaptureSummary> summary = session->Run(*host_, camera_, {.threads = 1});
+  ASSERT_TRUE(summary) << summary.error().message;
+  EXPECT_EQ(summary->taken, 13);
+  EXPECT_LT(*summary->session.frames[1].exposure_s, 0.4);
+  EXPECT_FALSE((*ReadJournal(dir_))->begun.exposure_s);
 }
 
 TEST_F(CaptureTest, StopsWhenAskedWithWhatItHas) {
@@ -365,7 +450,19 @@ TEST_F(CaptureTest, VerifyNamesEachDamage) {
   expect(replace("rig.json", "led-3", "led-x"), "rig.json: its SHA-256");
   expect(replace("session.json", "\"iso\": 100.0", "\"iso\": 101.0"), "tells of other frames");
   expect(replace("journal.jsonl", "\"iso\":100.0}}", "\"iso\":101.0}}"), "tells of other frames");
-  expect(replace("journal.jsonl", "{\"record\":\"complete\"}\n", ""), "complete");
+  expect(replace("journal.jsonl", "{\"record\":\"complete\"}\n", ""),
+         "go on with it: sateen capture --resume");
+  expect([&] { fs::remove(dir_ / "journal.jsonl"); }, "journal.jsonl: is missing");
+  // Captures of before did not name their journal.
+  fs::remove_all(dir_);
+  ASSERT_TRUE(Begin());
+  Session session = *ReadSessionRecord(dir_);
+  EXPECT_TRUE(session.has_journal);
+  session.has_journal = false;
+  WriteText(dir_ / "session.json", SessionToJson(session));
+  EXPECT_TRUE(VerifySession(dir_, {}));
+  fs::remove(dir_ / "journal.jsonl");
+  EXPECT_TRUE(VerifySession(dir_, {}));
 }
 
 }  // namespace

@@ -1,14 +1,17 @@
 #include "scanner/ptp_camera.h"
 
 #include <gmock/gmock.h>
+#include <sys/resource.h>
 
 #include <cmath>
+#include <csignal>
 #include <cstdlib>
 
 #include "core/file_io.h"
 #include "imaging/dng.h"
 #include "imaging/raw.h"
 #include "simulation/virtual_rig/ptp_responder.h"
+#include "tests/scanner/captures.h"
 #include "tests/testing/files.h"
 
 // PtpCamera with libgphoto2 as it is, and a camera on the loopback interface. Deadlines are long where
@@ -161,11 +164,45 @@ TEST_F(PtpCameraFaults, BusyForAWhileIsWaitedFor) {
   ExpectNextFrameIsItsOwn(*camera);
 }
 
-TEST_F(PtpCameraFaults, AFullCardIsSaid) {
+TEST_P(PtpCameraTest, AFullCardNeedsAPerson) {
   const auto camera = Opened();
   Virtual().Inject(CameraFault::kCardFull);
-  ExpectFailure(*camera, ErrorCode::kDevice, "card is full");
+  ExpectFailure(*camera, ErrorCode::kDevice,
+                ": the camera's memory card is full; delete files or change the card");
+  EXPECT_TRUE(camera->NeedsAPerson());
   ExpectNextFrameIsItsOwn(*camera);
+  EXPECT_FALSE(camera->NeedsAPerson());
+}
+
+// What the disk refuses is not laid to the camera, which goes on.
+TEST_P(PtpCameraTest, ADiskThatTakesNoFileIsSaidWithItsPath) {
+  const auto camera = Opened();
+  const fs::path gone = home_.Path() / "gone";
+  const Result<CapturedFile> failed = camera->Capture(gone, kLong);
+  ASSERT_FALSE(failed);
+  EXPECT_THAT(failed.error(), IsError(ErrorCode::kIo, (gone / ".").string()));
+  EXPECT_THAT(failed.error().message, HasSubstr("cannot write: No such file or directory"));
+  EXPECT_EQ(camera->state(), State::kOpen);
+  EXPECT_FALSE(camera->NeedsAPerson());
+  EXPECT_EQ(Virtual().Report().on_card, 1);  // it is not lost
+  ExpectNextFrameIsItsOwn(*camera);
+}
+
+// As on a disk that becomes full in the middle of a file: the worker inherits a limit of its size.
+TEST_P(PtpCameraTest, AFileThatFindsNoRoomLeavesNothing) {
+  rlimit before = {};
+  ASSERT_EQ(getrlimit(RLIMIT_FSIZE, &before), 0);
+  rlimit small = before;
+  small.rlim_cur = 1024;
+  std::signal(SIGXFSZ, SIG_IGN);
+  setrlimit(RLIMIT_FSIZE, &small);
+  const auto camera = Opened();
+  setrlimit(RLIMIT_FSIZE, &before);
+  std::signal(SIGXFSZ, SIG_DFL);
+  const Result<CapturedFile> failed = camera->Capture(folder_, kLong);
+  ASSERT_FALSE(failed);
+  EXPECT_THAT(failed.error(), IsError(ErrorCode::kIo, "File too large"));
+  EXPECT_TRUE(fs::is_empty(folder_));
 }
 
 TEST_F(PtpCameraFaults, AFileThatIsNeverAnnouncedEndsAtTheDeadline) {

@@ -183,6 +183,14 @@ TEST(RigProgram, SaysWhatToPasteIntoAnotherShell) {
   EXPECT_THAT(result.out, HasSubstr("SATEEN_VIRTUAL_PORT='"));
 }
 
+// A daemon of the user's has the real rig.
+TEST(RigProgram, ACommandUnderTheRigFindsNoDaemon) {
+  const ShellResult result =
+      Shell("SATEEN_SOCKET=/run/sateen/sateen.sock " + kRig + " run --rig '" + kRing +
+            "' -- sh -c 'echo \"[$SATEEN_SOCKET]\"' 2>/dev/null");
+  EXPECT_THAT(result.out, HasSubstr("[]"));
+}
+
 TEST(RigProgram, CommandsActOnTheBoard) {
   const TempFolder folder;
   RunningRig rig(folder.Path());
