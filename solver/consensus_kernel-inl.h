@@ -9,6 +9,8 @@
 
 #include <hwy/highway.h>
 
+#include <cmath>
+
 #include "solver/consensus.h"
 #include "solver/fast_kernel.h"
 #include "solver/fast_kernel_equations-inl.h"
@@ -251,7 +253,7 @@ HWY_INLINE V CostOf(const TripleSample* picked, size_t count, const Vector3& n, 
 }
 
 // (8) and (9): of the normals through three samples the one that most of the others agree with;
-// `n` stays where no triple is well conditioned.
+// `n` stays where no triple is well conditioned. Returns the product of (9).
 HWY_INLINE V SearchTriples(const TripleSample* picked, size_t count, Vector3& n) {
   const D d;
   V best = hn::Set(d, 3e38F);
@@ -277,7 +279,9 @@ HWY_INLINE V SearchTriples(const TripleSample* picked, size_t count, Vector3& n)
       }
     }
   }
-  return best;
+  // Without the sixteenths, of which there are as many as the fullest lane has samples: a pixel's
+  // answer must not depend on its neighbours.
+  return hn::Mul(best, hn::Set(d, std::exp2(4.0F * (static_cast<float>(count) - 2.0F))));
 }
 
 // Sums of (10) and (11) at one normal.

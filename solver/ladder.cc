@@ -239,7 +239,7 @@ void SolveConsensusInDouble(const Climb& climb, std::span<const size_t> pixels, 
   for (size_t j = 0; j < pixels.size(); ++j) {
     const size_t pixel = pixels[j];
     system.Gather(static_cast<int>(pixel % width), static_cast<int>(pixel / width));
-    const PlainAnswer answer = PlainConsensus(system);
+    const PlainAnswer answer = PlainConsensus(system, climb.options.least_squares.max_condition);
     const Eigen::Vector3d n = answer.n.stableNormalized();
     if (!n.allFinite() || n.isZero()) {
       agreeing[j] = 0;
@@ -253,6 +253,27 @@ void SolveConsensusInDouble(const Climb& climb, std::span<const size_t> pixels, 
     field.residual.pixels[pixel] = static_cast<float>(answer.residual);
     field.uncertainty.pixels[pixel] = static_cast<float>(std::min(answer.uncertainty_deg, 180.0));
     agreeing[j] = static_cast<uint8_t>(std::min(answer.agreeing, 255));
+  }
+}
+
+// What float refused, once more in double.
+void SolveRefusedInDouble(const Climb& climb, std::span<const size_t> pixels, NormalField& field,
+                          std::span<uint8_t> agreeing) {
+  std::vector<size_t> places;
+  std::vector<size_t> refused;
+  for (size_t j = 0; j < pixels.size(); ++j) {
+    if (agreeing[j] == 0) {
+      places.push_back(j);
+      refused.push_back(pixels[j]);
+    }
+  }
+  if (refused.empty()) {
+    return;
+  }
+  std::vector<uint8_t> of_refused(refused.size());
+  SolveConsensusInDouble(climb, refused, field, of_refused);
+  for (size_t j = 0; j < places.size(); ++j) {
+    agreeing[places[j]] = of_refused[j];
   }
 }
 
@@ -315,6 +336,9 @@ void ClimbPixels(const Climb& climb, int begin, int end, std::span<const size_t>
   std::vector<uint8_t> agreeing(pixels.size());
   if (climb.fast_rows) {
     climb.fast_rows->SolveConsensus(begin, end, pixels, field, agreeing);
+    if (climb.options.least_squares.backend == Backend::kAuto) {
+      SolveRefusedInDouble(climb, pixels, field, agreeing);
+    }
   } else {
     SolveConsensusInDouble(climb, pixels, field, agreeing);
   }

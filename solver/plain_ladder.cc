@@ -26,6 +26,12 @@ double AngularVarianceOf(const Eigen::Matrix3d& c, const Eigen::Vector3d& n) {
   return std::max(0.0, c.trace() - n.dot(c * n) / squared) / squared;
 }
 
+double ConditionSquared(const Eigen::Matrix3d& a) {
+  const Eigen::Vector3d values =
+      Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(a, Eigen::EigenvaluesOnly).eigenvalues();
+  return values[2] / std::max(0.0, values[0]);
+}
+
 // A pixel's samples in order of brightness, in medians.
 struct RankedSamples {
   std::vector<Eigen::Index> order;  // all usable ones
@@ -211,7 +217,7 @@ PlainAnswer PlainWeighted(const PixelSystem& system, const StackNoise& noise) {
   return answer;
 }
 
-PlainAnswer PlainConsensus(const PixelSystem& system) {
+PlainAnswer PlainConsensus(const PixelSystem& system, double max_condition) {
   PlainSearch search = SearchPlain(system, LuminanceWeights());
   const Eigen::Vector3d chroma = ChromaOf(system);
   if (chroma != LuminanceWeights()) {
@@ -235,7 +241,7 @@ PlainAnswer PlainConsensus(const PixelSystem& system) {
     n = answer.n_rgb * ranked.w;
   }
   sums = SumsAt(system, ranked, n, /*start=*/false);
-  if (!n.allFinite()) {
+  if (!n.allFinite() || !(ConditionSquared(sums.a) <= max_condition * max_condition)) {
     return {};
   }
   const double spread = sums.squares / std::max(1.0, sums.weights - 3.0);

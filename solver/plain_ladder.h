@@ -21,8 +21,9 @@ struct PlainAnswer {
 
 // Equations (1) to (5), with s = 1, from N^0 of least squares.
 [[nodiscard]] PlainAnswer PlainWeighted(const PixelSystem& system, const StackNoise& noise);
-// Equations (6) to (11).
-[[nodiscard]] PlainAnswer PlainConsensus(const PixelSystem& system);
+// Equations (6) to (11); no answer where the samples that count have lights whose condition number is
+// above max_condition.
+[[nodiscard]] PlainAnswer PlainConsensus(const PixelSystem& system, double max_condition);
 
 // Marks the pixels of this reason in `misfit`, for WeighRowsInDouble to find.
 void MarkPending(Reason which, int row_begin, int row_end, const NormalField& field,
