@@ -19,8 +19,8 @@ struct KernelLight {
   std::array<float, 3> inverse_flux = {};  // distant: 1 / phi; otherwise 1 / (phi 1e6 mm^2)
   float clip = 0.0F;                       // radiance at or above is saturated
   float dark = 0.0F;                       // radiance above is not dark
-  // Variance of one sample of radiance i: shot i + read_squared, red, green, blue. For
-  // SolveWeightedSpan alone.
+  // Variance of i', i / flux with the light's factor for the place left out: shot i' + read_squared,
+  // red, green, blue. For SolveWeightedSpan alone.
   std::array<float, 3> shot = {};
   std::array<float, 3> read_squared = {};
 };

@@ -29,11 +29,6 @@ double FluxScale(const Lights& lights) {
   return std::exp2(std::round(sum / static_cast<double>(lights.size())));
 }
 
-std::array<float, 3> Floats(const std::array<double, 3>& values) {
-  return {static_cast<float>(values[0]), static_cast<float>(values[1]),
-          static_cast<float>(values[2])};
-}
-
 bool HasField(const Light& light) { return light.model == LightModel::kLedField; }
 
 KernelLight KernelLightOf(const Light& light, const LightFrame& frame, const SampleNoise& noise,
@@ -43,16 +38,19 @@ KernelLight KernelLightOf(const Light& light, const LightFrame& frame, const Sam
   const Eigen::Vector3f axis = light.axis.cast<float>();
   const Eigen::Vector3f inverse_flux =
       (light.flux_rgb * (distant ? 1.0 : 1e6) / flux_scale).cwiseInverse().cast<float>();
-  return {.model = light.model,
-          .place = {place.x(), place.y(), place.z()},
-          .axis = {axis.x(), axis.y(), axis.z()},
-          .anisotropy = static_cast<float>(light.anisotropy),
-          .inverse_flux = {inverse_flux.x(), inverse_flux.y(), inverse_flux.z()},
-          .clip = ClipThreshold(frame, options),
-          .dark = DarkThreshold(frame, options),
-          .shot = Floats(noise.shot),
-          .read_squared = Floats({noise.read[0] * noise.read[0], noise.read[1] * noise.read[1],
-                                  noise.read[2] * noise.read[2]})};
+  KernelLight kernel_light{.model = light.model,
+                           .place = {place.x(), place.y(), place.z()},
+                           .axis = {axis.x(), axis.y(), axis.z()},
+                           .anisotropy = static_cast<float>(light.anisotropy),
+                           .inverse_flux = {inverse_flux.x(), inverse_flux.y(), inverse_flux.z()},
+                           .clip = ClipThreshold(frame, options),
+                           .dark = DarkThreshold(frame, options)};
+  for (size_t c = 0; c < 3; ++c) {
+    const auto f = static_cast<double>(kernel_light.inverse_flux[c]);
+    kernel_light.shot[c] = static_cast<float>(f * noise.shot[c]);
+    kernel_light.read_squared[c] = static_cast<float>(f * f * noise.read[c] * noise.read[c]);
+  }
+  return kernel_light;
 }
 
 }  // namespace

@@ -14,6 +14,7 @@ namespace sateen {
 namespace {
 
 constexpr float kMarked = -1.0F;
+constexpr double kLeastVarianceShare = 1e-6;  // for channels without noise
 
 Eigen::Vector3d LuminanceWeights() {
   return {static_cast<double>(kLuminance[0]), static_cast<double>(kLuminance[1]),
@@ -180,36 +181,35 @@ PlainAnswer PlainWeighted(const PixelSystem& system, const StackNoise& noise) {
   PlainAnswer answer;
   answer.n_rgb = n0.leftCols<3>();
   answer.residual = (system.Rhs().col(3) - l * n).norm() / std::sqrt(system.Count());
-  const Eigen::Vector3d b = (answer.n_rgb.transpose() * n / n.squaredNorm()).cwiseMax(0.0);  // (2)
+  const Eigen::Array3d b =
+      (answer.n_rgb.transpose() * n / n.squaredNorm()).cwiseMax(0.0).array();    // (2)
+  const auto variances = [&](Eigen::Index k, double bright) -> Eigen::Array3d {  // (1)
+    const SampleNoise& of_frame = noise[static_cast<size_t>(system.FrameOf(k))];
+    const Eigen::Array3d f = 1.0 / system.E().row(k).transpose().array();
+    return f * (Eigen::Map<const Eigen::Array3d>(of_frame.shot.data()) * b * bright +
+                f * Eigen::Map<const Eigen::Array3d>(of_frame.read.data()).square());
+  };
+  Eigen::Array3d v = variances(0, n.norm());
+  v = v.max(kLeastVarianceShare * v.sum());
+  const Eigen::Array3d u = b / v / (b.square() / v).sum();  // (3)
   Eigen::Matrix3d a = Eigen::Matrix3d::Zero();
   Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
   double chi_squared = 0.0;
   for (Eigen::Index k = 0; k < system.Count(); ++k) {
     const double predicted = l.row(k).dot(n);
     const double bright = std::max(predicted, static_cast<double>(kLeastCosine) * n.norm());
-    const SampleNoise& of_frame = noise[static_cast<size_t>(system.FrameOf(k))];
-    double weight = 0.0;
-    double r = 0.0;
-    for (Eigen::Index c = 0; c < 3; ++c) {
-      const double f = 1.0 / system.E()(k, c);
-      const auto channel = static_cast<size_t>(c);
-      const double variance = f * (of_frame.shot[channel] * b[c] * bright +
-                                   f * of_frame.read[channel] * of_frame.read[channel]);  // (1)
-      if (variance > 0.0) {
-        weight += b[c] * b[c] / variance;
-        r += b[c] / variance * (system.Rhs()(k, c) - b[c] * predicted);
-      }
-    }
+    const double weight = 1.0 / (u.square() * variances(k, bright)).sum();
+    const double r = system.Rhs().row(k).head<3>().dot(u.matrix()) - predicted;
     a += weight * l.row(k).transpose() * l.row(k);
-    gradient += r * l.row(k).transpose();
-    chi_squared += weight > 0.0 ? r * r / weight : 0.0;
+    gradient += weight * r * l.row(k).transpose();
+    chi_squared += weight * r * r;
   }
   const Eigen::Matrix3d covariance = a.inverse();
   const Eigen::Vector3d step = covariance * gradient;
   if (!step.allFinite()) {
     return answer;
   }
-  answer.n = n + step;                                                                       // (3)
+  answer.n = n + step;                                                                       // (4)
   answer.uncertainty_deg = std::sqrt(AngularVarianceOf(covariance, answer.n)) * kDegPerRad;  // (4)
   if (system.Count() > 3) {
     answer.misfit = std::max(0.0, chi_squared - gradient.dot(step)) / (system.Count() - 3);  // (5)
