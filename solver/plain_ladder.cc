@@ -259,42 +259,43 @@ PlainAnswer PlainConsensus(const PixelSystem& system, double max_condition) {
 }
 
 void MarkPending(Reason which, int row_begin, int row_end, const NormalField& field,
-                 Image<float>& misfit) {
-  for (size_t p = field.reason.Index(0, row_begin); p < field.reason.Index(0, row_end); ++p) {
+                 std::span<float> misfits) {
+  const size_t first = field.reason.Index(0, row_begin);
+  for (size_t p = first; p < field.reason.Index(0, row_end); ++p) {
     if (field.reason.pixels[p] == static_cast<uint8_t>(which)) {
-      misfit.pixels[p] = kMarked;
+      misfits[p - first] = kMarked;
     }
   }
 }
 
 void WeighRowsInDouble(const LightStack& stack, const Rig& rig, const LambertianOptions& options,
                        const StackNoise& noise, int row_begin, int row_end, NormalField& field,
-                       Image<float>& misfit) {
+                       std::span<float> misfits) {
   PixelSystem system(stack, rig, options);
-  for (int row = row_begin; row < row_end; ++row) {
-    for (int column = 0; column < field.reason.width; ++column) {
-      const size_t pixel = field.reason.Index(column, row);
-      if (misfit.pixels[pixel] != kMarked) {
-        continue;
-      }
-      misfit.pixels[pixel] = 0.0F;
-      field.uncertainty.pixels[pixel] = 0.0F;
-      if (field.reason.pixels[pixel] != static_cast<uint8_t>(Reason::kSolved)) {
-        continue;
-      }
-      system.Gather(column, row);
-      const PlainAnswer answer = PlainWeighted(system, noise);
-      const Eigen::Vector3d n = answer.n.stableNormalized();
-      if (!n.allFinite() || n.isZero()) {
-        field.uncertainty.pixels[pixel] = 180.0F;
-        continue;
-      }
-      for (size_t c = 0; c < 3; ++c) {
-        field.normal[c].pixels[pixel] = static_cast<float>(n[static_cast<Eigen::Index>(c)]);
-      }
-      field.uncertainty.pixels[pixel] = static_cast<float>(std::min(answer.uncertainty_deg, 180.0));
-      misfit.pixels[pixel] = static_cast<float>(answer.misfit);
+  const size_t first = field.reason.Index(0, row_begin);
+  const auto width = static_cast<size_t>(field.reason.width);
+  for (size_t pixel = first; pixel < field.reason.Index(0, row_end); ++pixel) {
+    float& misfit = misfits[pixel - first];
+    if (misfit != kMarked) {
+      continue;
     }
+    misfit = 0.0F;
+    field.uncertainty.pixels[pixel] = 0.0F;
+    if (field.reason.pixels[pixel] != static_cast<uint8_t>(Reason::kSolved)) {
+      continue;
+    }
+    system.Gather(static_cast<int>(pixel % width), static_cast<int>(pixel / width));
+    const PlainAnswer answer = PlainWeighted(system, noise);
+    const Eigen::Vector3d n = answer.n.stableNormalized();
+    if (!n.allFinite() || n.isZero()) {
+      field.uncertainty.pixels[pixel] = 180.0F;
+      continue;
+    }
+    for (size_t c = 0; c < 3; ++c) {
+      field.normal[c].pixels[pixel] = static_cast<float>(n[static_cast<Eigen::Index>(c)]);
+    }
+    field.uncertainty.pixels[pixel] = static_cast<float>(std::min(answer.uncertainty_deg, 180.0));
+    misfit = static_cast<float>(answer.misfit);
   }
 }
 

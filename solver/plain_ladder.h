@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <span>
 
 #include "solver/lambertian.h"
 #include "solver/noise.h"
@@ -25,12 +26,13 @@ struct PlainAnswer {
 // above max_condition.
 [[nodiscard]] PlainAnswer PlainConsensus(const PixelSystem& system, double max_condition);
 
-// Marks the pixels of this reason in `misfit`, for WeighRowsInDouble to find.
+// Marks the pixels of this reason in `misfits`, one for each pixel of the rows, for
+// WeighRowsInDouble to find.
 void MarkPending(Reason which, int row_begin, int row_end, const NormalField& field,
-                 Image<float>& misfit);
+                 std::span<float> misfits);
 // PlainWeighted for the marked pixels that are solved by now.
 void WeighRowsInDouble(const LightStack& stack, const Rig& rig, const LambertianOptions& options,
                        const StackNoise& noise, int row_begin, int row_end, NormalField& field,
-                       Image<float>& misfit);
+                       std::span<float> misfits);
 
 }  // namespace sateen
