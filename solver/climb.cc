@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -87,53 +88,47 @@ void SolveRefusedInDouble(const Climb& climb, std::span<const size_t> pixels, No
   }
 }
 
-// Rung 1's word on pixels [begin, end); appends those that have to climb to `pixels`.
-void KeepOrClimb(const Climb& climb, std::span<const float> all_misfits, size_t first, size_t begin,
-                 size_t end, NormalField& field, PieceSummary& summary,
-                 std::vector<size_t>& pixels) {
-  const bool always = climb.options.mode == LadderMode::kConsensus;
-  const bool never = climb.options.mode == LadderMode::kLeastSquares;
-  const auto scale = static_cast<float>(std::sqrt(climb.scale_squared));
-  const float lowest = *std::min_element(climb.limit.begin(), climb.limit.end());
-  const uint8_t* const reason = field.reason.pixels.data();
-  const uint8_t* const samples = field.samples.pixels.data();
-  const float* const misfits = all_misfits.data() - first;
-  uint8_t* const model = field.model.pixels.data();
-  float* const uncertainty = field.uncertainty.pixels.data();
-  constexpr auto kSolvedCode = static_cast<uint8_t>(Reason::kSolved);
-  // Without branches, so that these become vectors.
-  for (size_t p = begin; p < end; ++p) {
-    const Rung rung = samples[p] <= 3 ? Rung::kUnchecked : Rung::kLeastSquares;
-    model[p] = reason[p] == kSolvedCode ? static_cast<uint8_t>(rung) : uint8_t{0};
+// Sum of some hundred uncertainties, in eight lanes, so that it becomes a vector.
+double SumOf(std::span<const float> values) {
+  std::array<float, 8> sums = {};
+  size_t j = 0;
+  for (; j + sums.size() <= values.size(); j += sums.size()) {
+    for (size_t lane = 0; lane < sums.size(); ++lane) {
+      sums[lane] += values[j + lane];
+    }
   }
-  int solved = 0;
-  int unchecked = 0;
-  for (size_t p = begin; p < end; ++p) {
-    solved += reason[p] == kSolvedCode ? 1 : 0;
-    unchecked += model[p] == static_cast<uint8_t>(Rung::kUnchecked) ? 1 : 0;
+  double total = 0.0;
+  for (; j < values.size(); ++j) {
+    total += static_cast<double>(values[j]);
   }
-  int suspects = always ? 1 : 0;
-  for (size_t p = begin; p < end; ++p) {
-    // In this order the minimum of 180 and not-a-number, of an infinite scale, is 180.
-    uncertainty[p] = reason[p] == kSolvedCode ? std::min(180.0F, uncertainty[p] * scale) : 0.0F;
-    suspects |= misfits[p] > lowest ? 1 : 0;
+  for (const float sum : sums) {
+    total += static_cast<double>(sum);
   }
-  double sum_deg = 0.0;
-  for (size_t p = begin; p < end; ++p) {
-    sum_deg += static_cast<double>(uncertainty[p]);  // zero where unsolved
+  return total;
+}
+
+// Appends those pixels of [first, first + misfits.size()) that have to climb.
+void FindClimbers(const Climb& climb, std::span<const float> misfits, size_t first,
+                  const NormalField& field, std::vector<size_t>& pixels) {
+  if (climb.options.mode == LadderMode::kLeastSquares) {
+    return;
   }
-  if (suspects != 0 && !never) {
-    for (size_t p = begin; p < end; ++p) {
-      if (IsSolved(field, p) && NeedsConsensus(climb, field, misfits[p], p)) {
-        pixels.push_back(p);
-        --solved;
-        sum_deg -= static_cast<double>(uncertainty[p]);
+  // More samples, lower limit.
+  const float lowest = climb.limit[std::min<size_t>(climb.stack.size(), climb.limit.size() - 1)];
+  for (size_t begin = 0; begin < misfits.size(); begin += kBlock) {
+    const std::span<const float> block =
+        misfits.subspan(begin, std::min(kBlock, misfits.size() - begin));
+    int suspects = climb.options.mode == LadderMode::kConsensus ? 1 : 0;
+    for (const float misfit : block) {  // without branches, so that this becomes a vector
+      suspects |= misfit > lowest ? 1 : 0;
+    }
+    for (size_t j = 0; suspects != 0 && j < block.size(); ++j) {
+      const size_t pixel = first + begin + j;
+      if (IsSolved(field, pixel) && NeedsConsensus(climb, field, block[j], pixel)) {
+        pixels.push_back(pixel);
       }
     }
   }
-  summary.least_squares += solved - unchecked;
-  summary.unchecked += unchecked;
-  summary.least_squares_deg += sum_deg;
 }
 
 // Rung 2 for the pixels of one piece.
@@ -201,13 +196,24 @@ PieceSummary SolveAndClimb(const Climb& climb, int begin, int end, NormalField& 
   PieceSummary summary;
   const FastRows::Geometry geometry = climb.rows.GeometryOf(begin, end);
   const size_t first = field.reason.Index(0, begin);
-  const size_t last = field.reason.Index(0, end);
-  std::vector<float> misfits(last - first);
-  climb.rows.SolveWeighted(begin, end, geometry, field, misfits, summary.counts);
-  std::vector<size_t> pixels;
-  for (size_t p = first; p < last; p += kBlock) {
-    KeepOrClimb(climb, misfits, first, p, std::min(p + kBlock, last), field, summary, pixels);
+  const size_t count = field.reason.Index(0, end) - first;
+  const auto memory = std::make_unique_for_overwrite<float[]>(count);
+  const std::span<float> misfits(memory.get(), count);
+  climb.rows.SolveWeighted(begin, end, geometry, std::sqrt(climb.scale_squared), field, misfits,
+                           summary.counts);
+  summary.unchecked = CountOf(static_cast<uint8_t>(Rung::kUnchecked),
+                              std::span(field.model.pixels).subspan(first, count));
+  for (size_t p = 0; p < count; p += kBlock) {
+    summary.least_squares_deg +=
+        SumOf(std::span(field.uncertainty.pixels).subspan(first + p, std::min(kBlock, count - p)));
   }
+  std::vector<size_t> pixels;
+  FindClimbers(climb, misfits, first, field, pixels);
+  for (const size_t pixel : pixels) {
+    summary.least_squares_deg -= static_cast<double>(field.uncertainty.pixels[pixel]);
+  }
+  summary.least_squares =
+      summary.counts.solved - summary.unchecked - static_cast<int64_t>(pixels.size());
   if (!pixels.empty()) {
     const auto start = std::chrono::steady_clock::now();
     ClimbPixels(climb, begin, geometry, pixels, field, summary);

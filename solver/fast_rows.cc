@@ -116,9 +116,9 @@ void FastRows::Solve(int begin, int end, NormalField& field) const {
   Run(SolveSpan, begin, end, GeometryOf(begin, end), field, nullptr);
 }
 
-void FastRows::SolveWeighted(int begin, int end, const Geometry& geometry, NormalField& field,
-                             std::span<float> misfits) const {
-  Run(SolveWeightedSpan, begin, end, geometry, field, misfits.data());
+void FastRows::SolveWeighted(int begin, int end, const Geometry& geometry, double noise_scale,
+                             NormalField& field, std::span<float> misfits) const {
+  Run(SolveWeightedSpan, begin, end, geometry, field, misfits.data(), noise_scale);
 }
 
 void FastRows::FillGains(int begin, int end, std::vector<float>& gains,
@@ -147,7 +147,7 @@ void FastRows::Touch(int begin, int end, NormalField& field) const {
 }
 
 void FastRows::Run(SpanFunction function, int begin, int end, const Geometry& geometry,
-                   NormalField& field, float* misfits) const {
+                   NormalField& field, float* misfits, double noise_scale) const {
   const size_t first = field.reason.Index(0, begin);
   const size_t count = field.reason.Index(0, end) - first;
   std::vector<const float*> planes;
@@ -163,14 +163,16 @@ void FastRows::Run(SpanFunction function, int begin, int end, const Geometry& ge
             .y_mm = geometry.y_mm.empty() ? nullptr : geometry.y_mm.data(),
             .inverse_gains = geometry.places.empty() ? nullptr : geometry.places.data(),
             .mask = *mask_ ? at(**mask_) : nullptr,
-            .count = count},
+            .count = count,
+            .noise_scale = static_cast<float>(noise_scale)},
            {.normal = {at(field.normal[0]), at(field.normal[1]), at(field.normal[2])},
             .albedo = {at(field.albedo[0]), at(field.albedo[1]), at(field.albedo[2])},
             .residual = at(field.residual),
             .samples = at(field.samples),
             .reason = at(field.reason),
             .uncertainty = misfits != nullptr ? at(field.uncertainty) : nullptr,
-            .misfit = misfits});
+            .misfit = misfits,
+            .model = misfits != nullptr ? at(field.model) : nullptr});
 }
 
 KernelInput FastRows::Listed::Input() const {
@@ -239,6 +241,7 @@ void FastRows::MisfitsAt(std::span<const size_t> pixels, std::span<float> misfit
     begin = end;
   }
   std::vector<float> results(8 * pixels.size());
+  std::vector<uint8_t> models(pixels.size());
   const auto result = [&](size_t index) { return results.data() + index * pixels.size(); };
   KernelInput input = listed.Input();
   if (!grid_) {
@@ -251,7 +254,8 @@ void FastRows::MisfitsAt(std::span<const size_t> pixels, std::span<float> misfit
                      .samples = samples.data(),
                      .reason = reasons.data(),
                      .uncertainty = result(7),
-                     .misfit = misfits.data()});
+                     .misfit = misfits.data(),
+                     .model = models.data()});
 }
 
 void FastRows::SolveConsensus(int begin, const Geometry& geometry, std::span<const size_t> pixels,

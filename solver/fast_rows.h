@@ -36,9 +36,10 @@ class FastRows {
 
   // Solves rows [begin, end) into `field`; refused pixels are kIllConditioned.
   void Solve(int begin, int end, NormalField& field) const;
-  // With weights, for which there must be noise: also field.uncertainty and the misfit of each pixel.
-  void SolveWeighted(int begin, int end, const Geometry& geometry, NormalField& field,
-                     std::span<float> misfits) const;
+  // With weights, for which there must be noise: also field.uncertainty, times noise_scale,
+  // field.model and the misfit of each pixel.
+  void SolveWeighted(int begin, int end, const Geometry& geometry, double noise_scale,
+                     NormalField& field, std::span<float> misfits) const;
   // Misfit, usable samples and reason of pixels anywhere, in order of their indices.
   void MisfitsAt(std::span<const size_t> pixels, std::span<float> misfits,
                  std::span<uint8_t> samples, std::span<uint8_t> reasons) const;
@@ -67,7 +68,7 @@ class FastRows {
   FastRows(const LightStack& stack, const std::optional<Mask>& mask)
       : stack_(&stack), mask_(&mask) {}
   void Run(SpanFunction function, int begin, int end, const Geometry& geometry, NormalField& field,
-           float* misfits) const;
+           float* misfits, double noise_scale = 1.0) const;
   [[nodiscard]] Listed MakeListed(std::span<const size_t> pixels) const;
   // Positions and gains of pixels[begin, end), whose geometry starts with pixel `first`.
   static void ListGeometry(const Geometry& geometry, size_t first, std::span<const size_t> pixels,

@@ -32,9 +32,10 @@ class LeastSquaresRows {
   [[nodiscard]] FastRows::Geometry GeometryOf(int begin, int end) const;
   // Solves rows [begin, end) into `field` and counts them in `counts`.
   void Solve(int begin, int end, NormalField& field, SolveSummary& counts) const;
-  // With weights: also field.uncertainty, equation (4) with s = 1, and equation (5) of each pixel.
-  void SolveWeighted(int begin, int end, const FastRows::Geometry& geometry, NormalField& field,
-                     std::span<float> misfits, SolveSummary& counts) const;
+  // With weights: also field.uncertainty, equation (4) with this s, field.model and equation (5) of
+  // each pixel.
+  void SolveWeighted(int begin, int end, const FastRows::Geometry& geometry, double noise_scale,
+                     NormalField& field, std::span<float> misfits, SolveSummary& counts) const;
   // Equation (5) of sample.pixels, in order of their indices and inside the mask.
   void FindMisfits(MisfitSample& sample) const;
   // Nothing for the double backends.
@@ -45,7 +46,8 @@ class LeastSquaresRows {
                    const LambertianOptions& options, const StackNoise* noise)
       : stack_(&stack), rig_(&rig), mask_(&mask), options_(&options), noise_(noise) {}
   // The pixels that the fast backend left, or all; returns how many it left.
-  int64_t SolvePending(int begin, int end, NormalField& field, std::span<float> misfits) const;
+  int64_t SolvePending(int begin, int end, double noise_scale, NormalField& field,
+                       std::span<float> misfits) const;
 
   const LightStack* stack_;
   const Rig* rig_;
@@ -54,6 +56,9 @@ class LeastSquaresRows {
   const StackNoise* noise_;
   std::unique_ptr<const FastRows> fast_;
 };
+
+// How many of these are `value`.
+[[nodiscard]] int64_t CountOf(uint8_t value, std::span<const uint8_t> bytes);
 
 // Adds the pixels that one piece counted.
 void AddCounts(const SolveSummary& piece, SolveSummary& total);

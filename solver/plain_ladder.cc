@@ -269,8 +269,8 @@ void MarkPending(Reason which, int row_begin, int row_end, const NormalField& fi
 }
 
 void WeighRowsInDouble(const LightStack& stack, const Rig& rig, const LambertianOptions& options,
-                       const StackNoise& noise, int row_begin, int row_end, NormalField& field,
-                       std::span<float> misfits) {
+                       const StackNoise& noise, double noise_scale, int row_begin, int row_end,
+                       NormalField& field, std::span<float> misfits) {
   PixelSystem system(stack, rig, options);
   const size_t first = field.reason.Index(0, row_begin);
   const auto width = static_cast<size_t>(field.reason.width);
@@ -281,10 +281,13 @@ void WeighRowsInDouble(const LightStack& stack, const Rig& rig, const Lambertian
     }
     misfit = 0.0F;
     field.uncertainty.pixels[pixel] = 0.0F;
+    field.model.pixels[pixel] = static_cast<uint8_t>(Rung::kNone);
     if (field.reason.pixels[pixel] != static_cast<uint8_t>(Reason::kSolved)) {
       continue;
     }
     system.Gather(static_cast<int>(pixel % width), static_cast<int>(pixel / width));
+    field.model.pixels[pixel] =
+        static_cast<uint8_t>(system.Count() <= 3 ? Rung::kUnchecked : Rung::kLeastSquares);
     const PlainAnswer answer = PlainWeighted(system, noise);
     const Eigen::Vector3d n = answer.n.stableNormalized();
     if (!n.allFinite() || n.isZero()) {
@@ -294,7 +297,9 @@ void WeighRowsInDouble(const LightStack& stack, const Rig& rig, const Lambertian
     for (size_t c = 0; c < 3; ++c) {
       field.normal[c].pixels[pixel] = static_cast<float>(n[static_cast<Eigen::Index>(c)]);
     }
-    field.uncertainty.pixels[pixel] = static_cast<float>(std::min(answer.uncertainty_deg, 180.0));
+    // In this order the minimum of 180 and not-a-number, of an infinite scale, is 180.
+    field.uncertainty.pixels[pixel] =
+        static_cast<float>(std::min(180.0, answer.uncertainty_deg * noise_scale));
     misfit = static_cast<float>(answer.misfit);
   }
 }

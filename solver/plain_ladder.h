@@ -30,9 +30,9 @@ struct PlainAnswer {
 // WeighRowsInDouble to find.
 void MarkPending(Reason which, int row_begin, int row_end, const NormalField& field,
                  std::span<float> misfits);
-// PlainWeighted for the marked pixels that are solved by now.
+// PlainWeighted for the marked pixels that are solved by now; uncertainties times noise_scale.
 void WeighRowsInDouble(const LightStack& stack, const Rig& rig, const LambertianOptions& options,
-                       const StackNoise& noise, int row_begin, int row_end, NormalField& field,
-                       std::span<float> misfits);
+                       const StackNoise& noise, double noise_scale, int row_begin, int row_end,
+                       NormalField& field, std::span<float> misfits);
 
 }  // namespace sateen
