@@ -17,7 +17,8 @@
 namespace sateen {
 namespace {
 
-constexpr size_t kBlock = 256;  // pixels that are looked at together
+constexpr size_t kSumBlock = 512;
+constexpr size_t kBlock = 64;  // pixels that are looked at together
 constexpr float kUnexplainedFactor = 3.0F;
 
 bool NeedsConsensus(const Climb& climb, const NormalField& field, float misfit, size_t pixel) {
@@ -203,9 +204,9 @@ PieceSummary SolveAndClimb(const Climb& climb, int begin, int end, NormalField& 
                            summary.counts);
   summary.unchecked = CountOf(static_cast<uint8_t>(Rung::kUnchecked),
                               std::span(field.model.pixels).subspan(first, count));
-  for (size_t p = 0; p < count; p += kBlock) {
-    summary.least_squares_deg +=
-        SumOf(std::span(field.uncertainty.pixels).subspan(first + p, std::min(kBlock, count - p)));
+  for (size_t p = 0; p < count; p += kSumBlock) {
+    summary.least_squares_deg += SumOf(
+        std::span(field.uncertainty.pixels).subspan(first + p, std::min(kSumBlock, count - p)));
   }
   std::vector<size_t> pixels;
   FindClimbers(climb, misfits, first, field, pixels);

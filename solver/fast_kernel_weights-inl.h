@@ -40,10 +40,10 @@ struct Weighted {
 // Variance of N / |N| across N, as an angle: (tr C - n C n) / |N|^2.
 HWY_INLINE V AngularVariance(const Symmetric3& c, const Vector3& n) {
   const D d;
-  const V squared = hn::Max(Dot(n, n), hn::Set(d, 1e-37F));
-  const V along = hn::Div(Dot(n, Times(c, n)), squared);
+  const V inverse = hn::Div(hn::Set(d, 1.0F), hn::Max(Dot(n, n), hn::Set(d, 1e-37F)));
   const V trace = hn::Add(c.xx, hn::Add(c.yy, c.zz));
-  return hn::Div(hn::Max(hn::Sub(trace, along), hn::Zero(d)), squared);
+  const V across = hn::NegMulAdd(Dot(n, Times(c, n)), inverse, trace);
+  return hn::Mul(hn::Max(across, hn::Zero(d)), inverse);
 }
 
 HWY_INLINE void AddOuter(const Vector3& l, V weight, Symmetric3& sum) {
@@ -79,8 +79,8 @@ HWY_INLINE NoiseUnits NoiseUnitsOf(const KernelLight& light, const float* slot,
   const V one = hn::Set(d, 1.0F);
   const V tiny = hn::Set(d, 1e-37F);
   const V squared = hn::Max(Dot(n, n), tiny);
-  const V length = hn::Sqrt(squared);
   const V inverse_squared = hn::Div(one, squared);
+  const V length = hn::Sqrt(squared);
   // The square must not overflow; at such radiance nothing but read noise is left.
   const V forward = hn::Min(scale.forward, hn::Set(d, 0x1p60F));
   V gain = one;
@@ -128,23 +128,56 @@ HWY_INLINE V DotOf(const std::array<float, 3>& of_light, const V* of_pixel) {
                                hn::Mul(hn::Set(d, of_light[2]), of_pixel[2])));
 }
 
-// W_k of (4), in units of 1 / reference.
+// One sample of (4).
+struct WeighedSample {
+  Vector3 l;   // zero where the sample is not usable
+  V misfit;    // m_k - N . l_k
+  V variance;  // 1 / W_k, in units of `reference`
+};
+
 template <bool kDistant>
-HWY_INLINE V WeightOf(const KernelLight& light, const float* slot, const NoiseUnits& units,
-                      V predicted) {
+HWY_INLINE WeighedSample WeighSample(const KernelLight& light, const float* slot, V threshold,
+                                     const NoiseUnits& units, const Vector3& n, V& sum_of_squares) {
   const D d;
+  const size_t lanes = hn::Lanes(d);
+  const V luminance = hn::Load(d, slot + 6 * lanes);
+  const M usable = hn::Gt(luminance, threshold);
+  WeighedSample sample;
+  sample.l = DirectionOf<kDistant>(light, slot, usable);
+  const V predicted = Dot(sample.l, n);
+  const V left = hn::Sub(hn::IfThenElseZero(usable, luminance), predicted);
+  sum_of_squares = hn::MulAdd(left, left, sum_of_squares);
+  const V mean = hn::MulAdd(units.u[0], hn::Load(d, slot + 3 * lanes),
+                            hn::MulAdd(units.u[1], hn::Load(d, slot + 4 * lanes),
+                                       hn::Mul(units.u[2], hn::Load(d, slot + 5 * lanes))));
+  sample.misfit = hn::IfThenElseZero(usable, hn::Sub(mean, predicted));
   const V bright = hn::Max(predicted, units.least);
   const V shot = hn::Mul(bright, DotOf(light.shot, units.d));
-  V read = DotOf(light.read_squared, units.e);
+  const V read = DotOf(light.read_squared, units.e);
   V variance;
   if constexpr (kDistant) {
     variance = hn::Add(shot, read);
   } else {
-    const V gain = hn::Load(d, slot + 7 * hn::Lanes(d));
+    const V gain = hn::Load(d, slot + 7 * lanes);
     variance = hn::Mul(gain, hn::MulAdd(gain, read, shot));
   }
-  return hn::Div(hn::Set(d, 1.0F), hn::Max(variance, hn::Set(d, kLeastVariance)));
+  sample.variance = hn::Max(variance, hn::Set(d, kLeastVariance));
+  return sample;
 }
+
+// Sums of (4) and (5).
+struct WeightedSums {
+  Symmetric3 a;      // sum of W l l^T
+  Vector3 gradient;  // sum of W l misfit
+  V chi_squared;
+
+  HWY_INLINE void Add(const WeighedSample& sample, V weight) {
+    const V r = hn::Mul(weight, sample.misfit);
+    AddOuter(sample.l, weight, a);
+    AddScaled(sample.l, r, gradient);
+    chi_squared = hn::MulAdd(r, sample.misfit, chi_squared);
+  }
+};
 
 template <bool kDistant>
 HWY_INLINE Weighted WeightedStep(const KernelParams& params, const float* scratch, V threshold,
@@ -154,35 +187,21 @@ HWY_INLINE Weighted WeightedStep(const KernelParams& params, const float* scratc
   const size_t lanes = hn::Lanes(d);
   const V zero = hn::Zero(d);
   const NoiseUnits units = NoiseUnitsOf<kDistant>(params.lights[0], scratch, n_rgb, n, scale);
-  Symmetric3 a{zero, zero, zero, zero, zero, zero};
-  Vector3 gradient{zero, zero, zero};
-  V chi_squared = zero;
+  WeightedSums sums{{zero, zero, zero, zero, zero, zero}, {zero, zero, zero}, zero};
   V sum_of_squares = zero;
+  const auto weigh = [&](size_t k) HWY_ATTR {
+    return WeighSample<kDistant>(params.lights[k], scratch + k * kScratchPerLight * lanes,
+                                 threshold, units, n, sum_of_squares);
+  };
   for (size_t k = 0; k < params.lights.size(); ++k) {
-    const KernelLight& light = params.lights[k];
-    const float* slot = scratch + k * kScratchPerLight * lanes;
-    const V luminance = hn::Load(d, slot + 6 * lanes);
-    const M usable = hn::Gt(luminance, threshold);
-    // Zero where the sample is not usable, and with it the prediction.
-    const Vector3 l = DirectionOf<kDistant>(light, slot, usable);
-    const V predicted = Dot(l, n);
-    const V left = hn::Sub(hn::IfThenElseZero(usable, luminance), predicted);
-    sum_of_squares = hn::MulAdd(left, left, sum_of_squares);
-    const V weight = WeightOf<kDistant>(light, slot, units, predicted);
-    const V mean = hn::MulAdd(units.u[0], hn::Load(d, slot + 3 * lanes),
-                              hn::MulAdd(units.u[1], hn::Load(d, slot + 4 * lanes),
-                                         hn::Mul(units.u[2], hn::Load(d, slot + 5 * lanes))));
-    const V misfit = hn::IfThenElseZero(usable, hn::Sub(mean, predicted));
-    const V r = hn::Mul(weight, misfit);
-    AddOuter(l, weight, a);
-    AddScaled(l, r, gradient);
-    chi_squared = hn::MulAdd(r, misfit, chi_squared);
+    const WeighedSample sample = weigh(k);
+    sums.Add(sample, hn::Div(hn::Set(d, 1.0F), sample.variance));
   }
-  const Inverse inverse = Invert(a, params.max_condition_squared * kWeightedConditionFactor);
-  const Vector3 step = Times(inverse.a, gradient);
+  const Inverse inverse = Invert(sums.a, params.max_condition_squared * kWeightedConditionFactor);
+  const Vector3 step = Times(inverse.a, sums.gradient);
   Weighted weighted;
   weighted.n = {hn::Add(n.x, step.x), hn::Add(n.y, step.y), hn::Add(n.z, step.z)};
-  chi_squared = hn::Max(hn::Sub(chi_squared, Dot(gradient, step)), zero);
+  const V chi_squared = hn::Max(hn::Sub(sums.chi_squared, Dot(sums.gradient, step)), zero);
   const V freedom = hn::Sub(count, hn::Set(d, 3.0F));
   weighted.misfit = hn::IfThenElseZero(
       hn::Gt(freedom, zero),

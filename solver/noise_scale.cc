@@ -21,9 +21,10 @@ constexpr double kLeastScaleSquared = 0.1;
 constexpr double kQuarterOfOneFreedom = 0.1015;  // quantile of chi^2
 // Pixels whose misfits are looked at, in runs, because neighbours are looked at, too; more where
 // fewer than kFewestMisfits of them are solved.
-constexpr int64_t kMisfitsLookedAt = 1 << 13;
+constexpr int64_t kMisfitsLookedAt = 1 << 12;
 constexpr int64_t kFewestMisfits = 1 << 11;
 constexpr int64_t kRun = 64;
+constexpr size_t kNeighbourStep = 3;  // differences then share no sample
 constexpr double kGoldenRatio = 0.6180339887498949;
 // Rounding's variance is 1/12 of a step squared, of which 1/6 goes for the variance of a sample; of
 // the second differences that do not vanish at least this share are single steps.
@@ -142,11 +143,12 @@ struct Neighbours {
 // squared.
 Neighbours LookAtNeighbours(const LightStack& stack, const MisfitSample& sample) {
   std::vector<float> squares;
+  squares.reserve(stack.size() * sample.pixels.size() / kNeighbourStep + stack.size());
   double sum_of_squares = 0.0;
   double sum_of_means = 0.0;
   size_t count = 0;
   const auto width = static_cast<size_t>(stack[0].rgb[0].width);
-  for (size_t j = 1; j + 1 < sample.pixels.size(); ++j) {
+  for (size_t j = 1; j + 1 < sample.pixels.size(); j += kNeighbourStep) {
     const size_t p = sample.pixels[j];
     const bool inside = p % width > 0 && p % width + 1 < width && sample.pixels[j - 1] + 1 == p &&
                         sample.pixels[j + 1] == p + 1 && sample.samples[j - 1] > 0 &&
