@@ -151,17 +151,24 @@ void ClimbPixels(const Climb& climb, int begin, const FastRows::Geometry& geomet
   }
   for (size_t j = 0; j < pixels.size(); ++j) {
     const bool explained = agreeing[j] >= kFewestAgreeing;
+    const Eigen::Vector3f after = NormalAt(field, pixels[j]);
+    const double turned_deg = std::atan2(static_cast<double>(before[j].cross(after).norm()),
+                                         static_cast<double>(before[j].dot(after))) *
+                              kDegPerRad;
+    const double rejected = 1.0 - static_cast<double>(agreeing[j]) /
+                                      static_cast<double>(field.samples.pixels[pixels[j]]);
     float& uncertainty = field.uncertainty.pixels[pixels[j]];
+    uncertainty = static_cast<float>(
+        std::min(180.0, (1.0 + std::max(0.0, rejected)) *
+                            std::hypot(static_cast<double>(uncertainty),
+                                       static_cast<double>(kUncertaintyOfTurn) * turned_deg)));
     if (!explained) {
       uncertainty = std::min(180.0F, uncertainty * kUnexplainedFactor);
       ++summary.unexplained;
     }
     field.model.pixels[pixels[j]] =
         static_cast<uint8_t>(explained ? Rung::kConsensus : Rung::kUnexplained);
-    const Eigen::Vector3f after = NormalAt(field, pixels[j]);
-    summary.turned_deg += std::atan2(static_cast<double>(before[j].cross(after).norm()),
-                                     static_cast<double>(before[j].dot(after))) *
-                          kDegPerRad;
+    summary.turned_deg += turned_deg;
     summary.robust_deg += static_cast<double>(uncertainty);
   }
   summary.robust += static_cast<int64_t>(pixels.size());

@@ -24,25 +24,40 @@ constexpr std::array<std::pair<LadderMode, std::string_view>, 3> kModeNames = {{
     {LadderMode::kConsensus, "robust"},
 }};
 
-// Where more pixels than this climb, the model is wrong in what noise hides in the others, too.
+// Where many pixels climb, the model is wrong in what noise hides in the others, too: fully from this
+// share on, and not at all where false alarms are as many.
 constexpr double kDoubtfulShare = 0.2;
+constexpr double kUndoubtedShare = 0.02;
 
 double SecondsSince(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-// Adds the model's error to the uncertainty of rung 1, for a scene in which many pixels climbed.
-Status DoubtLeastSquares(const Task& task, NormalField& field, PieceSummary& total) {
+// Share of the model's error that rung 1 gets where so many pixels climbed.
+double DoubtOf(const PieceSummary& total) {
+  const int64_t solved = total.least_squares + total.unchecked + total.robust;
+  const double share =
+      static_cast<double>(total.robust) / static_cast<double>(std::max<int64_t>(solved, 1));
+  return std::clamp((share - kUndoubtedShare) / (kDoubtfulShare - kUndoubtedShare), 0.0, 1.0);
+}
+
+// Adds the model's error to the uncertainty of rung 1, for a scene in which many pixels climbed. What
+// nothing could check is as wrong as those that climbed were.
+Status DoubtLeastSquares(double doubt, const Task& task, NormalField& field, PieceSummary& total) {
   const ImageSize size = field.reason.Size();
+  const auto model = static_cast<float>(doubt * static_cast<double>(kLeastModelUncertaintyDeg));
+  const double turned = total.turned_deg / static_cast<double>(std::max<int64_t>(total.robust, 1));
+  const float unchecked = std::hypot(model, static_cast<float>(doubt * turned));
   std::vector<double> sums(static_cast<size_t>(size.height), 0.0);
   Status status = ParallelFor(
       size.height, RowsPerPiece(size), {.threads = task.threads, .cancel = task.cancel},
       [&](int begin, int end) {
         for (size_t p = field.model.Index(0, begin); p < field.model.Index(0, end); ++p) {
-          if (field.model.pixels[p] == static_cast<uint8_t>(Rung::kLeastSquares) ||
-              field.model.pixels[p] == static_cast<uint8_t>(Rung::kUnchecked)) {
+          const auto rung = static_cast<Rung>(field.model.pixels[p]);
+          if (rung == Rung::kLeastSquares || rung == Rung::kUnchecked) {
             float& uncertainty = field.uncertainty.pixels[p];
-            uncertainty = std::min(180.0F, std::hypot(uncertainty, kLeastModelUncertaintyDeg));
+            const float more = rung == Rung::kUnchecked ? unchecked : model;
+            uncertainty = std::min(180.0F, std::hypot(uncertainty, more));
             sums[static_cast<size_t>(begin)] += static_cast<double>(uncertainty);
           }
         }
@@ -107,9 +122,8 @@ Status ClimbAllRows(const Climb& climb, const Task& task, NormalField& field, Pi
   for (const PieceSummary& piece : pieces) {
     total.Add(piece);
   }
-  const int64_t solved = total.least_squares + total.unchecked + total.robust;
-  if (status && static_cast<double>(total.robust) > kDoubtfulShare * static_cast<double>(solved)) {
-    status = DoubtLeastSquares(task, field, total);
+  if (const double doubt = DoubtOf(total); status && doubt > 0.0) {
+    status = DoubtLeastSquares(doubt, task, field, total);
   }
   return status;
 }
