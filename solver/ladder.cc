@@ -45,9 +45,11 @@ double DoubtOf(const PieceSummary& total) {
 // nothing could check is as wrong as those that climbed were.
 Status DoubtLeastSquares(double doubt, const Task& task, NormalField& field, PieceSummary& total) {
   const ImageSize size = field.reason.Size();
-  const auto model = static_cast<float>(doubt * static_cast<double>(kLeastModelUncertaintyDeg));
-  const double turned = total.turned_deg / static_cast<double>(std::max<int64_t>(total.robust, 1));
-  const float unchecked = std::hypot(model, static_cast<float>(doubt * turned));
+  const auto turned = static_cast<float>(total.turned_deg /
+                                         static_cast<double>(std::max<int64_t>(total.robust, 1)));
+  const auto share = static_cast<float>(doubt);
+  const float model = share * std::hypot(kLeastModelUncertaintyDeg, kUncertaintyOfTurn * turned);
+  const float unchecked = share * std::hypot(kLeastModelUncertaintyDeg, turned);
   std::vector<double> sums(static_cast<size_t>(size.height), 0.0);
   Status status = ParallelFor(
       size.height, RowsPerPiece(size), {.threads = task.threads, .cancel = task.cancel},
