@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <future>
+#include <string>
 #include <utility>
 #include <vector>
 
+#include "cli/canvas.h"
 #include "cli/pictures.h"
 #include "imaging/image_io.h"
 
@@ -127,12 +129,20 @@ Status MapsWriter::Finish(const Image3& first_frame, OutputFolder& folder) {
   }
   const Image<uint8_t> known = small_quality_.Known();
   const Image<float> quality = small_quality_.Mean(0);
+  const float top = TopOf(quality, known);
+  const std::string heat = error_ ? HeatCaption("error from truth", top, "degrees")
+                                  : HeatCaption("residual", top, "");
+  std::vector<Rgb8> panels;
+  for (const auto& [panel, caption] :
+       {std::pair{ShowLinear(first_frame), std::string("first frame")},
+        std::pair{ShowNormal(small_normal_.Means()), std::string("normal")},
+        std::pair{ShowLinear(small_albedo_.Means()), std::string("albedo")},
+        std::pair{ShowHeat(quality, top, known), heat}}) {
+    panels.push_back(Captioned(panel, caption));
+  }
   return status.and_then([&] {
     return WritePng8(folder.Stage("overview.png"),
-                     SideBySide({ShowLinear(first_frame), ShowNormal(small_normal_.Means()),
-                                 ShowLinear(small_albedo_.Means()),
-                                 ShowHeat(quality, TopOf(quality, known), known)},
-                                kOverviewPanelWidthPx));
+                     ContactSheet(panels, static_cast<int>(panels.size())));
   });
 }
 

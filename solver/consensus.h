@@ -34,5 +34,7 @@ inline constexpr int kFewestAgreeing = 4;
 // (11): the spread of the samples tells of the model's error only in part.
 inline constexpr float kUncertaintyFactor = 4.0F;
 inline constexpr float kLeastModelUncertaintyDeg = 3.0F;
+// (12): of the angle between two estimates that disagree, so much is doubt about the better one.
+inline constexpr float kUncertaintyOfTurn = 0.4F;
 
 }  // namespace sateen

@@ -9,6 +9,8 @@
 
 #include <hwy/highway.h>
 
+#include <cmath>
+
 #include "solver/consensus.h"
 #include "solver/fast_kernel.h"
 #include "solver/fast_kernel_equations-inl.h"
@@ -231,17 +233,14 @@ HWY_INLINE Pair PairOf(const TripleSample& a, const TripleSample& b) {
            hn::MulSub(a.i, b.l.z, hn::Mul(b.i, a.l.z))}};
 }
 
-// (9): the product of 1 + |r| / c over all samples, each factor divided by 16 to stay in a float.
-template <typename Skip>
-HWY_INLINE V CostOf(const TripleSample* picked, size_t count, const Vector3& n, const Skip& skip) {
+// (9): the product of 1 + |r| / c over all samples, each factor divided by 16 to stay in a float. Those
+// that the plane goes through are not left out: to find them costs more than their factors of 1.
+HWY_INLINE V CostOf(const TripleSample* picked, size_t count, const Vector3& n) {
   const D d;
   const V slope = hn::Set(d, 1.0F / (16.0F * kConsensusScale));
   const V least = hn::Set(d, 1.0F / 16.0F);
-  V cost = least;
+  V cost = hn::Set(d, 1.0F);
   for (size_t k = 0; k < count; ++k) {
-    if (skip(k)) {
-      continue;  // the plane goes through them
-    }
     const V r = hn::Abs(hn::NegMulAdd(
         picked[k].l.x, n.x,
         hn::NegMulAdd(picked[k].l.y, n.y, hn::NegMulAdd(picked[k].l.z, n.z, picked[k].i))));
@@ -251,7 +250,7 @@ HWY_INLINE V CostOf(const TripleSample* picked, size_t count, const Vector3& n, 
 }
 
 // (8) and (9): of the normals through three samples the one that most of the others agree with;
-// `n` stays where no triple is well conditioned.
+// `n` stays where no triple is well conditioned. Returns the product of (9).
 HWY_INLINE V SearchTriples(const TripleSample* picked, size_t count, Vector3& n) {
   const D d;
   V best = hn::Set(d, 3e38F);
@@ -268,8 +267,7 @@ HWY_INLINE V SearchTriples(const TripleSample* picked, size_t count, Vector3& n)
         const Vector3 m{hn::Mul(hn::MulAdd(picked[c].i, pair.cross.x, turned.x), inverse),
                         hn::Mul(hn::MulAdd(picked[c].i, pair.cross.y, turned.y), inverse),
                         hn::Mul(hn::MulAdd(picked[c].i, pair.cross.z, turned.z), inverse)};
-        const V cost =
-            CostOf(picked, count, m, [&](size_t k) { return k == a || k == b || k == c; });
+        const V cost = CostOf(picked, count, m);
         const M better = hn::And(regular, hn::Lt(cost, best));
         best = hn::IfThenElse(better, cost, best);
         n = {hn::IfThenElse(better, m.x, n.x), hn::IfThenElse(better, m.y, n.y),
@@ -277,7 +275,9 @@ HWY_INLINE V SearchTriples(const TripleSample* picked, size_t count, Vector3& n)
       }
     }
   }
-  return best;
+  // Without the sixteenths, of which there are as many as the fullest lane has samples: a pixel's
+  // answer must not depend on its neighbours.
+  return hn::Mul(best, hn::Set(d, std::exp2(4.0F * static_cast<float>(count))));
 }
 
 // Sums of (10) and (11) at one normal.

@@ -98,8 +98,16 @@ HWY_INLINE void SolveVector(const KernelParams& params, const KernelInput& input
   const V mean = hn::Div(sum_of_squares, hn::Max(eq.count, one));
   store(ScaleDown(hn::Mul(hn::Sqrt(mean), result_scale), scale), output.residual);
   if constexpr (kWeighted) {
-    store(weighted.uncertainty_deg, output.uncertainty);
+    const V uncertainty =
+        hn::Mul(weighted.uncertainty_deg, hn::Set(d, input.noise_scale));  // not a number: unknown
+    const V unknown = hn::Set(d, 180.0F);
+    store(hn::IfThenElse(hn::Lt(uncertainty, unknown), uncertainty, unknown), output.uncertainty);
     store(weighted.misfit, output.misfit);
+    const M unchecked = hn::Le(eq.count, hn::Set(d, 3.0F));
+    const VI rung = hn::IfThenElse(hn::RebindMask(di, unchecked),
+                                   hn::Set(di, static_cast<int32_t>(Rung::kUnchecked)),
+                                   hn::Set(di, static_cast<int32_t>(Rung::kLeastSquares)));
+    StoreBytes(hn::IfThenElseZero(hn::RebindMask(di, solved), rung), output.model + offset);
   }
   const auto inside_bits = hn::RebindMask(di, inside);
   StoreBytes(

@@ -19,8 +19,8 @@ struct KernelLight {
   std::array<float, 3> inverse_flux = {};  // distant: 1 / phi; otherwise 1 / (phi 1e6 mm^2)
   float clip = 0.0F;                       // radiance at or above is saturated
   float dark = 0.0F;                       // radiance above is not dark
-  // Variance of one sample of radiance i: shot i + read_squared, red, green, blue. For
-  // SolveWeightedSpan alone.
+  // Variance of i', i / flux with the light's factor for the place left out: shot i' + read_squared,
+  // red, green, blue. For SolveWeightedSpan alone.
   std::array<float, 3> shot = {};
   std::array<float, 3> read_squared = {};
 };
@@ -43,6 +43,8 @@ struct KernelInput {
   const float* const* inverse_gains = nullptr;
   const uint8_t* mask = nullptr;  // 0 outside; null: all inside
   size_t count = 0;
+  // SolveWeightedSpan: s of solver/ladder.h, infinity where it is not known.
+  float noise_scale = 1.0F;
 };
 
 struct KernelOutput {
@@ -53,8 +55,9 @@ struct KernelOutput {
   uint8_t* reason = nullptr;
   // SolveWeightedSpan and SolveConsensusSpan.
   float* uncertainty = nullptr;  // degrees
-  // SolveWeightedSpan: chi^2 over its degrees of freedom, 0 where there is none.
+  // SolveWeightedSpan: chi^2 over its degrees of freedom, 0 where there is none, and the rung.
   float* misfit = nullptr;
+  uint8_t* model = nullptr;
   // SolveConsensusSpan: usable samples that agree with the normal.
   uint8_t* agreeing = nullptr;
 };
@@ -77,7 +80,7 @@ inline constexpr float kFloatConditionSquared = 400.0F;
 void SolveSpan(const KernelParams& params, const KernelInput& input, const KernelOutput& output);
 
 /// The same, then one step to the normal that has the samples' noise for weights (equations (1) to
-/// (5) of solver/ladder.h); `uncertainty` and `misfit` must be there. Costs 1.7 times SolveSpan.
+/// (5) of solver/ladder.h); `uncertainty`, `misfit` and `model` must be there. Costs 1.4 times SolveSpan.
 void SolveWeightedSpan(const KernelParams& params, const KernelInput& input,
                        const KernelOutput& output);
 

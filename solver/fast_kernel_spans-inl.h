@@ -27,6 +27,7 @@ HWY_INLINE void StoreUnsolved(size_t offset, const KernelOutput& output) {
   if (output.uncertainty != nullptr) {
     hn::StoreU(hn::Zero(d), d, output.uncertainty + offset);
     hn::StoreU(hn::Zero(d), d, output.misfit + offset);
+    StoreBytes(hn::Zero(DI()), output.model + offset);
   }
   StoreBytes(hn::Zero(DI()), output.samples + offset);
   StoreBytes(hn::Set(DI(), static_cast<int32_t>(Reason::kOutsideMask)), output.reason + offset);
@@ -73,7 +74,7 @@ HWY_INLINE void ForEachVector(const KernelParams& params, const KernelInput& inp
   for (size_t p = 0; p < plane_count; ++p) {
     planes[p] = pad(p, input.planes[p]);
   }
-  KernelInput tail{.planes = planes.data(), .count = lanes};
+  KernelInput tail{.planes = planes.data(), .count = lanes, .noise_scale = input.noise_scale};
   if (input.x_mm != nullptr) {
     tail.x_mm = pad(plane_count, input.x_mm);
     tail.y_mm = pad(plane_count + 1, input.y_mm);
@@ -85,7 +86,7 @@ HWY_INLINE void ForEachVector(const KernelParams& params, const KernelInput& inp
     }
   }
   tail.inverse_gains = gains.data();
-  std::vector<uint8_t> bytes(4 * lanes, 0);
+  std::vector<uint8_t> bytes(5 * lanes, 0);
   std::fill_n(bytes.begin(), rest, uint8_t{1});
   if (input.mask != nullptr) {
     std::copy_n(input.mask + whole, rest, bytes.begin());
@@ -101,6 +102,7 @@ HWY_INLINE void ForEachVector(const KernelParams& params, const KernelInput& inp
                      bytes.data() + 2 * lanes,
                      result(7),
                      result(8),
+                     bytes.data() + 4 * lanes,
                      bytes.data() + 3 * lanes});
   for (size_t c = 0; c < 3; ++c) {
     std::copy_n(result(c), rest, output.normal[c] + whole);
@@ -112,6 +114,7 @@ HWY_INLINE void ForEachVector(const KernelParams& params, const KernelInput& inp
   }
   if (output.misfit != nullptr) {
     std::copy_n(result(8), rest, output.misfit + whole);
+    std::copy_n(bytes.data() + 4 * lanes, rest, output.model + whole);
   }
   if (output.agreeing != nullptr) {
     std::copy_n(bytes.data() + 3 * lanes, rest, output.agreeing + whole);

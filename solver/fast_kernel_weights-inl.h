@@ -24,6 +24,11 @@ constexpr float kDegreesPerRadian = static_cast<float>(180.0 / std::numbers::pi)
 // Weights spread the condition number of A; float holds that much more of it.
 constexpr float kWeightedConditionFactor = 16.0F;
 
+// Bound of a channel's share of the variance, for channels without noise ...
+constexpr float kLeastVarianceShare = 1e-6F;
+// ... and of a sample's variance over `reference`.
+constexpr float kLeastVariance = 1e-9F;
+
 struct Weighted {
   Vector3 n;
   V uncertainty_deg;
@@ -35,10 +40,10 @@ struct Weighted {
 // Variance of N / |N| across N, as an angle: (tr C - n C n) / |N|^2.
 HWY_INLINE V AngularVariance(const Symmetric3& c, const Vector3& n) {
   const D d;
-  const V squared = hn::Max(Dot(n, n), hn::Set(d, 1e-37F));
-  const V along = hn::Div(Dot(n, Times(c, n)), squared);
+  const V inverse = hn::Div(hn::Set(d, 1.0F), hn::Max(Dot(n, n), hn::Set(d, 1e-37F)));
   const V trace = hn::Add(c.xx, hn::Add(c.yy, c.zz));
-  return hn::Div(hn::Max(hn::Sub(trace, along), hn::Zero(d)), squared);
+  const V across = hn::NegMulAdd(Dot(n, Times(c, n)), inverse, trace);
+  return hn::Mul(hn::Max(across, hn::Zero(d)), inverse);
 }
 
 HWY_INLINE void AddOuter(const Vector3& l, V weight, Symmetric3& sum) {
@@ -52,19 +57,127 @@ HWY_INLINE void AddOuter(const Vector3& l, V weight, Symmetric3& sum) {
   sum.zz = hn::MulAdd(hn::Mul(weight, l.z), l.z, sum.zz);
 }
 
-// What the variance of channel c is made of, in units of that of a white pixel facing light 0, so
-// that float holds the weights whatever the units.
-struct NoiseUnit {
-  V shot;  // times the lane's power of two
-  V read;  // its square
+// What the noise weights of a vector of pixels have in common. With g_k the factor of light k that
+// depends on the place,
+//
+//     sum_c u_c^2 var_kc = reference g_k (max(N . l_k, ..) shot_k . D + g_k read_k . E)
+//
+// where `reference` is the sum of the channels' variances on a pixel that faces light 0: float holds the
+// rest whatever the units.
+struct NoiseUnits {
+  V u[3];  // (3)
+  V d[3];
+  V e[3];
+  V least;  // 0.02 |N|
+  V reference;
 };
 
-HWY_INLINE NoiseUnit NoiseUnitOf(const Scale& scale) {
+template <bool kDistant>
+HWY_INLINE NoiseUnits NoiseUnitsOf(const KernelLight& light, const float* slot,
+                                   const Vector3* n_rgb, const Vector3& n, const Scale& scale) {
   const D d;
+  const V one = hn::Set(d, 1.0F);
+  const V tiny = hn::Set(d, 1e-37F);
+  const V squared = hn::Max(Dot(n, n), tiny);
+  const V inverse_squared = hn::Div(one, squared);
+  const V length = hn::Sqrt(squared);
   // The square must not overflow; at such radiance nothing but read noise is left.
   const V forward = hn::Min(scale.forward, hn::Set(d, 0x1p60F));
-  return {forward, hn::Mul(forward, forward)};
+  V gain = one;
+  if constexpr (!kDistant) {
+    gain = hn::Load(d, slot + 7 * hn::Lanes(d));
+    gain = hn::IfThenElse(hn::Gt(gain, hn::Zero(d)), gain, hn::Set(d, 1e6F));  // behind the LED
+  }
+  const V read = hn::Mul(forward, forward);
+  const V shot = hn::Mul(forward, length);
+  V b[3];
+  V variance[3];
+  for (size_t c = 0; c < 3; ++c) {
+    b[c] = hn::Max(hn::Mul(Dot(n_rgb[c], n), inverse_squared), hn::Zero(d));  // (2)
+    variance[c] = hn::MulAdd(hn::Mul(b[c], hn::Set(d, light.shot[c])), shot,
+                             hn::Mul(hn::Mul(gain, hn::Set(d, light.read_squared[c])), read));
+  }
+  const V sum = hn::Add(variance[0], hn::Add(variance[1], variance[2]));
+  NoiseUnits units;
+  units.reference = hn::Max(hn::Mul(gain, sum), tiny);
+  const V inverse = hn::Div(one, units.reference);
+  const V to_share = hn::Mul(gain, inverse);
+  for (V& v : variance) {
+    v = hn::Max(hn::Mul(v, to_share), hn::Set(d, kLeastVarianceShare));
+  }
+  const V t[3] = {hn::Mul(b[0], hn::Mul(variance[1], variance[2])),
+                  hn::Mul(b[1], hn::Mul(variance[0], variance[2])),
+                  hn::Mul(b[2], hn::Mul(variance[0], variance[1]))};
+  const V norm = hn::MulAdd(t[0], b[0], hn::MulAdd(t[1], b[1], hn::Mul(t[2], b[2])));
+  const V inverse_norm = hn::Div(one, hn::Max(norm, tiny));
+  for (size_t c = 0; c < 3; ++c) {
+    units.u[c] = hn::Mul(t[c], inverse_norm);
+    const V relative = hn::Mul(hn::Mul(units.u[c], units.u[c]), inverse);
+    units.d[c] = hn::Mul(relative, hn::Mul(b[c], forward));
+    units.e[c] = hn::Mul(relative, read);
+  }
+  units.least = hn::Mul(length, hn::Set(d, kLeastCosine));
+  return units;
 }
+
+// Sum of a light's three figures times a pixel's.
+HWY_INLINE V DotOf(const std::array<float, 3>& of_light, const V* of_pixel) {
+  const D d;
+  return hn::MulAdd(hn::Set(d, of_light[0]), of_pixel[0],
+                    hn::MulAdd(hn::Set(d, of_light[1]), of_pixel[1],
+                               hn::Mul(hn::Set(d, of_light[2]), of_pixel[2])));
+}
+
+// One sample of (4).
+struct WeighedSample {
+  Vector3 l;   // zero where the sample is not usable
+  V misfit;    // m_k - N . l_k
+  V variance;  // 1 / W_k, in units of `reference`
+};
+
+template <bool kDistant>
+HWY_INLINE WeighedSample WeighSample(const KernelLight& light, const float* slot, V threshold,
+                                     const NoiseUnits& units, const Vector3& n, V& sum_of_squares) {
+  const D d;
+  const size_t lanes = hn::Lanes(d);
+  const V luminance = hn::Load(d, slot + 6 * lanes);
+  const M usable = hn::Gt(luminance, threshold);
+  WeighedSample sample;
+  sample.l = DirectionOf<kDistant>(light, slot, usable);
+  const V predicted = Dot(sample.l, n);
+  const V left = hn::Sub(hn::IfThenElseZero(usable, luminance), predicted);
+  sum_of_squares = hn::MulAdd(left, left, sum_of_squares);
+  const V mean = hn::MulAdd(units.u[0], hn::Load(d, slot + 3 * lanes),
+                            hn::MulAdd(units.u[1], hn::Load(d, slot + 4 * lanes),
+                                       hn::Mul(units.u[2], hn::Load(d, slot + 5 * lanes))));
+  sample.misfit = hn::IfThenElseZero(usable, hn::Sub(mean, predicted));
+  const V bright = hn::Max(predicted, units.least);
+  const V shot = hn::Mul(bright, DotOf(light.shot, units.d));
+  const V read = DotOf(light.read_squared, units.e);
+  V variance;
+  if constexpr (kDistant) {
+    variance = hn::Add(shot, read);
+  } else {
+    const V gain = hn::Load(d, slot + 7 * lanes);
+    variance = hn::Mul(gain, hn::MulAdd(gain, read, shot));
+  }
+  sample.variance = hn::Max(variance, hn::Set(d, kLeastVariance));
+  return sample;
+}
+
+// Sums of (4) and (5).
+struct WeightedSums {
+  Symmetric3 a;      // sum of W l l^T
+  Vector3 gradient;  // sum of W l misfit
+  V chi_squared;
+
+  HWY_INLINE void Add(const WeighedSample& sample, V weight) {
+    const V r = hn::Mul(weight, sample.misfit);
+    AddOuter(sample.l, weight, a);
+    AddScaled(sample.l, r, gradient);
+    chi_squared = hn::MulAdd(r, sample.misfit, chi_squared);
+  }
+};
 
 template <bool kDistant>
 HWY_INLINE Weighted WeightedStep(const KernelParams& params, const float* scratch, V threshold,
@@ -73,81 +186,28 @@ HWY_INLINE Weighted WeightedStep(const KernelParams& params, const float* scratc
   const D d;
   const size_t lanes = hn::Lanes(d);
   const V zero = hn::Zero(d);
-  const V one = hn::Set(d, 1.0F);
-  const V tiny = hn::Set(d, 1e-37F);
-  const V squared = hn::Max(Dot(n, n), tiny);
-  const V length = hn::Sqrt(squared);
-  const V least = hn::Mul(length, hn::Set(d, kLeastCosine));
-  const NoiseUnit unit = NoiseUnitOf(scale);
-  V b[3];
-  for (size_t c = 0; c < 3; ++c) {
-    b[c] = hn::Max(hn::Div(Dot(n_rgb[c], n), squared), zero);  // (2)
-  }
-  V reference = one;
-  V inverse_reference = one;
-  Symmetric3 a{zero, zero, zero, zero, zero, zero};
-  Vector3 gradient{zero, zero, zero};
-  V chi_squared = zero;
+  const NoiseUnits units = NoiseUnitsOf<kDistant>(params.lights[0], scratch, n_rgb, n, scale);
+  WeightedSums sums{{zero, zero, zero, zero, zero, zero}, {zero, zero, zero}, zero};
   V sum_of_squares = zero;
+  const auto weigh = [&](size_t k) HWY_ATTR {
+    return WeighSample<kDistant>(params.lights[k], scratch + k * kScratchPerLight * lanes,
+                                 threshold, units, n, sum_of_squares);
+  };
   for (size_t k = 0; k < params.lights.size(); ++k) {
-    const KernelLight& light = params.lights[k];
-    const float* slot = scratch + k * kScratchPerLight * lanes;
-    const V luminance = hn::Load(d, slot + 6 * lanes);
-    const M usable = hn::Gt(luminance, threshold);
-    const Vector3 l = DirectionOf<kDistant>(light, slot, usable);
-    const V predicted = Dot(l, n);
-    const V left = hn::Sub(hn::IfThenElseZero(usable, luminance), predicted);
-    sum_of_squares = hn::MulAdd(left, left, sum_of_squares);
-    const V bright = hn::Max(predicted, least);
-    V gain = one;
-    if constexpr (!kDistant) {
-      gain = hn::Load(d, slot + 7 * lanes);
-    }
-    const auto variance = [&](size_t c, V signal) HWY_ATTR {  // (1), of i'
-      const V factor = hn::Mul(gain, hn::Set(d, light.inverse_flux[c]));
-      return hn::Mul(
-          factor,
-          hn::MulAdd(hn::Mul(hn::Set(d, light.shot[c]), unit.shot), signal,
-                     hn::Mul(factor, hn::Mul(hn::Set(d, light.read_squared[c]), unit.read))));
-    };
-    if (k == 0) {
-      gain = hn::IfThenElse(hn::Gt(gain, zero), gain, hn::Set(d, 1e6F));  // behind the LED
-      reference = hn::Max(variance(1, length), tiny);
-      inverse_reference = hn::Div(one, reference);
-    }
-    // One division for three reciprocals; the bounds keep their product in a float.
-    const auto relative = [&](size_t c) HWY_ATTR {
-      return hn::Clamp(hn::Mul(variance(c, hn::Mul(b[c], bright)), inverse_reference),
-                       hn::Set(d, 1e-9F), hn::Set(d, 1e9F));
-    };
-    const V v[3] = {relative(0), relative(1), relative(2)};
-    const V v12 = hn::Mul(v[1], v[2]);
-    const V inverse_all = hn::Div(one, hn::Mul(v[0], v12));
-    const V share[3] = {hn::Mul(b[0], hn::Mul(v12, inverse_all)),
-                        hn::Mul(b[1], hn::Mul(hn::Mul(v[0], v[2]), inverse_all)),
-                        hn::Mul(b[2], hn::Mul(hn::Mul(v[0], v[1]), inverse_all))};
-    V weight = hn::MulAdd(share[0], b[0], hn::MulAdd(share[1], b[1], hn::Mul(share[2], b[2])));
-    const V weighted_sample =
-        hn::MulAdd(share[0], hn::Load(d, slot + 3 * lanes),
-                   hn::MulAdd(share[1], hn::Load(d, slot + 4 * lanes),
-                              hn::Mul(share[2], hn::Load(d, slot + 5 * lanes))));
-    weight = hn::IfThenElseZero(usable, weight);  // W of (4)
-    const V r = hn::IfThenElseZero(usable, hn::NegMulAdd(weight, predicted, weighted_sample));
-    AddOuter(l, weight, a);
-    AddScaled(l, r, gradient);
-    chi_squared = hn::Add(chi_squared, hn::Div(hn::Mul(r, r), hn::Max(weight, tiny)));
+    const WeighedSample sample = weigh(k);
+    sums.Add(sample, hn::Div(hn::Set(d, 1.0F), sample.variance));
   }
-  const Inverse inverse = Invert(a, params.max_condition_squared * kWeightedConditionFactor);
-  const Vector3 step = Times(inverse.a, gradient);
+  const Inverse inverse = Invert(sums.a, params.max_condition_squared * kWeightedConditionFactor);
+  const Vector3 step = Times(inverse.a, sums.gradient);
   Weighted weighted;
   weighted.n = {hn::Add(n.x, step.x), hn::Add(n.y, step.y), hn::Add(n.z, step.z)};
-  chi_squared = hn::Max(hn::Sub(chi_squared, Dot(gradient, step)), zero);
+  const V chi_squared = hn::Max(hn::Sub(sums.chi_squared, Dot(sums.gradient, step)), zero);
   const V freedom = hn::Sub(count, hn::Set(d, 3.0F));
-  weighted.misfit =
-      hn::IfThenElseZero(hn::Gt(freedom, zero),
-                         hn::Div(chi_squared, hn::Mul(reference, hn::Max(freedom, one))));  // (5)
+  weighted.misfit = hn::IfThenElseZero(
+      hn::Gt(freedom, zero),
+      hn::Div(chi_squared, hn::Mul(units.reference, hn::Max(freedom, hn::Set(d, 1.0F)))));  // (5)
   weighted.uncertainty_deg =
-      hn::Mul(hn::Sqrt(hn::Mul(AngularVariance(inverse.a, weighted.n), reference)),
+      hn::Mul(hn::Sqrt(hn::Mul(AngularVariance(inverse.a, weighted.n), units.reference)),
               hn::Set(d, kDegreesPerRadian));  // (4)
   weighted.sum_of_squares = sum_of_squares;
   weighted.accepted = inverse.accepted;

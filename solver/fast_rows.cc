@@ -13,11 +13,6 @@ namespace {
 
 constexpr int kPixelsPerPiece = 1 << 13;
 
-std::array<float, 3> Floats(const std::array<double, 3>& values) {
-  return {static_cast<float>(values[0]), static_cast<float>(values[1]),
-          static_cast<float>(values[2])};
-}
-
 bool HasField(const Light& light) { return light.model == LightModel::kLedField; }
 
 KernelLight KernelLightOf(const Light& light, const LightFrame& frame, const SampleNoise& noise,
@@ -27,16 +22,19 @@ KernelLight KernelLightOf(const Light& light, const LightFrame& frame, const Sam
   const Eigen::Vector3f axis = light.axis.cast<float>();
   const Eigen::Vector3f inverse_flux =
       (light.flux_rgb * (distant ? 1.0 : 1e6) / flux_scale).cwiseInverse().cast<float>();
-  return {.model = light.model,
-          .place = {place.x(), place.y(), place.z()},
-          .axis = {axis.x(), axis.y(), axis.z()},
-          .anisotropy = static_cast<float>(light.anisotropy),
-          .inverse_flux = {inverse_flux.x(), inverse_flux.y(), inverse_flux.z()},
-          .clip = ClipThreshold(frame, options),
-          .dark = DarkThreshold(frame, options),
-          .shot = Floats(noise.shot),
-          .read_squared = Floats({noise.read[0] * noise.read[0], noise.read[1] * noise.read[1],
-                                  noise.read[2] * noise.read[2]})};
+  KernelLight kernel_light{.model = light.model,
+                           .place = {place.x(), place.y(), place.z()},
+                           .axis = {axis.x(), axis.y(), axis.z()},
+                           .anisotropy = static_cast<float>(light.anisotropy),
+                           .inverse_flux = {inverse_flux.x(), inverse_flux.y(), inverse_flux.z()},
+                           .clip = ClipThreshold(frame, options),
+                           .dark = DarkThreshold(frame, options)};
+  for (size_t c = 0; c < 3; ++c) {
+    const auto f = static_cast<double>(kernel_light.inverse_flux[c]);
+    kernel_light.shot[c] = static_cast<float>(f * noise.shot[c]);
+    kernel_light.read_squared[c] = static_cast<float>(f * f * noise.read[c] * noise.read[c]);
+  }
+  return kernel_light;
 }
 
 }  // namespace
@@ -96,8 +94,8 @@ Result<FastRows> FastRows::Make(const LightStack& stack, const Rig& rig,
   return rows;
 }
 
-FastRows::RowGeometry FastRows::GeometryOf(int begin, int end) const {
-  RowGeometry geometry;
+FastRows::Geometry FastRows::GeometryOf(int begin, int end) const {
+  Geometry geometry;
   if (grid_) {
     const auto width = static_cast<size_t>((*stack_)[0].rgb[0].width);
     geometry.x_mm.resize(width * static_cast<size_t>(end - begin));
@@ -116,8 +114,9 @@ void FastRows::Solve(int begin, int end, NormalField& field) const {
   Run(SolveSpan, begin, end, GeometryOf(begin, end), field, nullptr);
 }
 
-void FastRows::SolveWeighted(int begin, int end, NormalField& field, Image<float>& misfit) const {
-  Run(SolveWeightedSpan, begin, end, GeometryOf(begin, end), field, &misfit);
+void FastRows::SolveWeighted(int begin, int end, const Geometry& geometry, double noise_scale,
+                             NormalField& field, std::span<float> misfits) const {
+  Run(SolveWeightedSpan, begin, end, geometry, field, misfits.data(), noise_scale);
 }
 
 void FastRows::FillGains(int begin, int end, std::vector<float>& gains,
@@ -145,8 +144,8 @@ void FastRows::Touch(int begin, int end, NormalField& field) const {
   Run(TouchSpan, begin, end, {}, field, nullptr);
 }
 
-void FastRows::Run(SpanFunction function, int begin, int end, const RowGeometry& geometry,
-                   NormalField& field, Image<float>* misfit) const {
+void FastRows::Run(SpanFunction function, int begin, int end, const Geometry& geometry,
+                   NormalField& field, float* misfits, double noise_scale) const {
   const size_t first = field.reason.Index(0, begin);
   const size_t count = field.reason.Index(0, end) - first;
   std::vector<const float*> planes;
@@ -162,54 +161,110 @@ void FastRows::Run(SpanFunction function, int begin, int end, const RowGeometry&
             .y_mm = geometry.y_mm.empty() ? nullptr : geometry.y_mm.data(),
             .inverse_gains = geometry.places.empty() ? nullptr : geometry.places.data(),
             .mask = *mask_ ? at(**mask_) : nullptr,
-            .count = count},
+            .count = count,
+            .noise_scale = static_cast<float>(noise_scale)},
            {.normal = {at(field.normal[0]), at(field.normal[1]), at(field.normal[2])},
             .albedo = {at(field.albedo[0]), at(field.albedo[1]), at(field.albedo[2])},
             .residual = at(field.residual),
             .samples = at(field.samples),
             .reason = at(field.reason),
-            .uncertainty = misfit != nullptr ? at(field.uncertainty) : nullptr,
-            .misfit = misfit != nullptr ? at(*misfit) : nullptr});
+            .uncertainty = misfits != nullptr ? at(field.uncertainty) : nullptr,
+            .misfit = misfits,
+            .model = misfits != nullptr ? at(field.model) : nullptr});
 }
 
-void FastRows::SolveConsensus(int begin, int end, std::span<const size_t> pixels,
-                              NormalField& field, std::span<uint8_t> agreeing) const {
-  const size_t first = field.reason.Index(0, begin);
-  const size_t count = pixels.size();
-  const RowGeometry geometry = GeometryOf(begin, end);
-  // The listed pixels side by side, so that every lane of a vector has work.
-  std::vector<float> gathered((4 * stack_->size() + 2) * count, 0.0F);
-  size_t next = 0;
-  const auto gather = [&](const float* from, size_t shift) -> const float* {
-    float* const to = gathered.data() + next;
-    next += count;
-    for (size_t j = 0; from != nullptr && j < count; ++j) {
-      to[j] = from[pixels[j] - shift];
-    }
-    return to;
-  };
-  std::vector<const float*> planes;
-  std::vector<const float*> gains(stack_->size(), nullptr);
-  for (size_t k = 0; k < stack_->size(); ++k) {
-    for (const Image<float>& plane : (*stack_)[k].rgb.planes) {
-      planes.push_back(gather(plane.pixels.data(), 0));
-    }
-    if (!geometry.places.empty() && geometry.places[k] != nullptr) {
-      gains[k] = gather(geometry.places[k], first);
+KernelInput FastRows::Listed::Input() const {
+  return {.planes = planes.data(),
+          .x_mm = values.data() + (planes.size() + gains.size()) * count,
+          .y_mm = values.data() + (planes.size() + gains.size() + 1) * count,
+          .inverse_gains = gains.data(),
+          .count = count};
+}
+
+FastRows::Listed FastRows::MakeListed(std::span<const size_t> pixels) const {
+  const size_t lights = stack_->size();
+  Listed listed;
+  listed.count = pixels.size();
+  listed.values.resize((4 * lights + 2) * pixels.size(), 0.0F);
+  for (const LightFrame& frame : *stack_) {
+    for (const Image<float>& plane : frame.rgb.planes) {
+      float* const to = listed.values.data() + listed.planes.size() * pixels.size();
+      for (size_t j = 0; j < pixels.size(); ++j) {
+        to[j] = plane.pixels[pixels[j]];
+      }
+      listed.planes.push_back(to);
     }
   }
-  const auto position = [&](const std::vector<float>& of_rows) {
-    return gather(of_rows.empty() ? nullptr : of_rows.data(), first);
+  for (size_t k = 0; k < lights; ++k) {
+    const bool has_field = gains_ && gains_->Has(k);
+    listed.gains.push_back(has_field ? listed.values.data() + (3 * lights + k) * pixels.size()
+                                     : nullptr);
+  }
+  return listed;
+}
+
+void FastRows::ListGeometry(const Geometry& geometry, size_t first, std::span<const size_t> pixels,
+                            size_t begin, size_t end, Listed& listed) {
+  const size_t planes = listed.planes.size();
+  const size_t lights = listed.gains.size();
+  const auto list = [&](const float* from, size_t index) {
+    float* const to = listed.values.data() + index * listed.count;
+    for (size_t j = begin; j < end; ++j) {
+      to[j] = from[pixels[j] - first];
+    }
   };
-  const KernelInput input{.planes = planes.data(),
-                          .x_mm = position(geometry.x_mm),
-                          .y_mm = position(geometry.y_mm),
-                          .inverse_gains = gains.data(),
-                          .count = count};
+  for (size_t k = 0; k < geometry.places.size(); ++k) {
+    if (geometry.places[k] != nullptr) {
+      list(geometry.places[k], planes + k);
+    }
+  }
+  if (!geometry.x_mm.empty()) {
+    list(geometry.x_mm.data(), planes + lights);
+    list(geometry.y_mm.data(), planes + lights + 1);
+  }
+}
+
+void FastRows::MisfitsAt(std::span<const size_t> pixels, std::span<float> misfits,
+                         std::span<uint8_t> samples, std::span<uint8_t> reasons) const {
+  Listed listed = MakeListed(pixels);
+  const auto width = static_cast<size_t>((*stack_)[0].rgb[0].width);
+  for (size_t begin = 0; begin < pixels.size();) {
+    const size_t row = pixels[begin] / width;
+    size_t end = begin;
+    while (end < pixels.size() && pixels[end] / width == row) {
+      ++end;
+    }
+    const auto v = static_cast<int>(row);
+    ListGeometry(GeometryOf(v, v + 1), row * width, pixels, begin, end, listed);
+    begin = end;
+  }
+  std::vector<float> results(8 * pixels.size());
+  std::vector<uint8_t> models(pixels.size());
+  const auto result = [&](size_t index) { return results.data() + index * pixels.size(); };
+  KernelInput input = listed.Input();
+  if (!grid_) {
+    input.x_mm = nullptr;  // the kernel for distant lights
+  }
+  SolveWeightedSpan(params_, input,
+                    {.normal = {result(0), result(1), result(2)},
+                     .albedo = {result(3), result(4), result(5)},
+                     .residual = result(6),
+                     .samples = samples.data(),
+                     .reason = reasons.data(),
+                     .uncertainty = result(7),
+                     .misfit = misfits.data(),
+                     .model = models.data()});
+}
+
+void FastRows::SolveConsensus(int begin, const Geometry& geometry, std::span<const size_t> pixels,
+                              NormalField& field, std::span<uint8_t> agreeing) const {
+  const size_t count = pixels.size();
+  Listed listed = MakeListed(pixels);
+  ListGeometry(geometry, field.reason.Index(0, begin), pixels, 0, count, listed);
   std::vector<float> results(8 * count);
   std::vector<uint8_t> bytes(2 * count);
   const auto result = [&](size_t index) { return results.data() + index * count; };
-  SolveConsensusSpan(params_, input,
+  SolveConsensusSpan(params_, listed.Input(),
                      {.normal = {result(0), result(1), result(2)},
                       .albedo = {result(3), result(4), result(5)},
                       .residual = result(6),

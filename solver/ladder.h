@@ -93,8 +93,4 @@ struct LadderOptions {
                                      const std::optional<Mask>& mask, const LadderOptions& options,
                                      const Task& task, NormalField& field);
 
-// The `share` quantile of chi^2 over its degrees of freedom: of one and two in closed form, beyond
-// by Wilson and Hilferty's cube root, within 7 % for shares of 0.05 and more.
-[[nodiscard]] double ChiSquaredQuantile(double share, int freedom);
-
 }  // namespace sateen

@@ -14,6 +14,7 @@ namespace sateen {
 namespace {
 
 constexpr float kMarked = -1.0F;
+constexpr double kLeastVarianceShare = 1e-6;  // for channels without noise
 
 Eigen::Vector3d LuminanceWeights() {
   return {static_cast<double>(kLuminance[0]), static_cast<double>(kLuminance[1]),
@@ -24,6 +25,12 @@ Eigen::Vector3d LuminanceWeights() {
 double AngularVarianceOf(const Eigen::Matrix3d& c, const Eigen::Vector3d& n) {
   const double squared = n.squaredNorm();
   return std::max(0.0, c.trace() - n.dot(c * n) / squared) / squared;
+}
+
+double ConditionSquared(const Eigen::Matrix3d& a) {
+  const Eigen::Vector3d values =
+      Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(a, Eigen::EigenvaluesOnly).eigenvalues();
+  return values[2] / std::max(0.0, values[0]);
 }
 
 // A pixel's samples in order of brightness, in medians.
@@ -174,36 +181,35 @@ PlainAnswer PlainWeighted(const PixelSystem& system, const StackNoise& noise) {
   PlainAnswer answer;
   answer.n_rgb = n0.leftCols<3>();
   answer.residual = (system.Rhs().col(3) - l * n).norm() / std::sqrt(system.Count());
-  const Eigen::Vector3d b = (answer.n_rgb.transpose() * n / n.squaredNorm()).cwiseMax(0.0);  // (2)
+  const Eigen::Array3d b =
+      (answer.n_rgb.transpose() * n / n.squaredNorm()).cwiseMax(0.0).array();    // (2)
+  const auto variances = [&](Eigen::Index k, double bright) -> Eigen::Array3d {  // (1)
+    const SampleNoise& of_frame = noise[static_cast<size_t>(system.FrameOf(k))];
+    const Eigen::Array3d f = 1.0 / system.E().row(k).transpose().array();
+    return f * (Eigen::Map<const Eigen::Array3d>(of_frame.shot.data()) * b * bright +
+                f * Eigen::Map<const Eigen::Array3d>(of_frame.read.data()).square());
+  };
+  Eigen::Array3d v = variances(0, n.norm());
+  v = v.max(kLeastVarianceShare * v.sum());
+  const Eigen::Array3d u = b / v / (b.square() / v).sum();  // (3)
   Eigen::Matrix3d a = Eigen::Matrix3d::Zero();
   Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
   double chi_squared = 0.0;
   for (Eigen::Index k = 0; k < system.Count(); ++k) {
     const double predicted = l.row(k).dot(n);
     const double bright = std::max(predicted, static_cast<double>(kLeastCosine) * n.norm());
-    const SampleNoise& of_frame = noise[static_cast<size_t>(system.FrameOf(k))];
-    double weight = 0.0;
-    double r = 0.0;
-    for (Eigen::Index c = 0; c < 3; ++c) {
-      const double f = 1.0 / system.E()(k, c);
-      const auto channel = static_cast<size_t>(c);
-      const double variance = f * (of_frame.shot[channel] * b[c] * bright +
-                                   f * of_frame.read[channel] * of_frame.read[channel]);  // (1)
-      if (variance > 0.0) {
-        weight += b[c] * b[c] / variance;
-        r += b[c] / variance * (system.Rhs()(k, c) - b[c] * predicted);
-      }
-    }
+    const double weight = 1.0 / (u.square() * variances(k, bright)).sum();
+    const double r = system.Rhs().row(k).head<3>().dot(u.matrix()) - predicted;
     a += weight * l.row(k).transpose() * l.row(k);
-    gradient += r * l.row(k).transpose();
-    chi_squared += weight > 0.0 ? r * r / weight : 0.0;
+    gradient += weight * r * l.row(k).transpose();
+    chi_squared += weight * r * r;
   }
   const Eigen::Matrix3d covariance = a.inverse();
   const Eigen::Vector3d step = covariance * gradient;
   if (!step.allFinite()) {
     return answer;
   }
-  answer.n = n + step;                                                                       // (3)
+  answer.n = n + step;                                                                       // (4)
   answer.uncertainty_deg = std::sqrt(AngularVarianceOf(covariance, answer.n)) * kDegPerRad;  // (4)
   if (system.Count() > 3) {
     answer.misfit = std::max(0.0, chi_squared - gradient.dot(step)) / (system.Count() - 3);  // (5)
@@ -211,7 +217,7 @@ PlainAnswer PlainWeighted(const PixelSystem& system, const StackNoise& noise) {
   return answer;
 }
 
-PlainAnswer PlainConsensus(const PixelSystem& system) {
+PlainAnswer PlainConsensus(const PixelSystem& system, double max_condition) {
   PlainSearch search = SearchPlain(system, LuminanceWeights());
   const Eigen::Vector3d chroma = ChromaOf(system);
   if (chroma != LuminanceWeights()) {
@@ -235,7 +241,7 @@ PlainAnswer PlainConsensus(const PixelSystem& system) {
     n = answer.n_rgb * ranked.w;
   }
   sums = SumsAt(system, ranked, n, /*start=*/false);
-  if (!n.allFinite()) {
+  if (!n.allFinite() || !(ConditionSquared(sums.a) <= max_condition * max_condition)) {
     return {};
   }
   const double spread = sums.squares / std::max(1.0, sums.weights - 3.0);
@@ -253,42 +259,48 @@ PlainAnswer PlainConsensus(const PixelSystem& system) {
 }
 
 void MarkPending(Reason which, int row_begin, int row_end, const NormalField& field,
-                 Image<float>& misfit) {
-  for (size_t p = field.reason.Index(0, row_begin); p < field.reason.Index(0, row_end); ++p) {
+                 std::span<float> misfits) {
+  const size_t first = field.reason.Index(0, row_begin);
+  for (size_t p = first; p < field.reason.Index(0, row_end); ++p) {
     if (field.reason.pixels[p] == static_cast<uint8_t>(which)) {
-      misfit.pixels[p] = kMarked;
+      misfits[p - first] = kMarked;
     }
   }
 }
 
 void WeighRowsInDouble(const LightStack& stack, const Rig& rig, const LambertianOptions& options,
-                       const StackNoise& noise, int row_begin, int row_end, NormalField& field,
-                       Image<float>& misfit) {
+                       const StackNoise& noise, double noise_scale, int row_begin, int row_end,
+                       NormalField& field, std::span<float> misfits) {
   PixelSystem system(stack, rig, options);
-  for (int row = row_begin; row < row_end; ++row) {
-    for (int column = 0; column < field.reason.width; ++column) {
-      const size_t pixel = field.reason.Index(column, row);
-      if (misfit.pixels[pixel] != kMarked) {
-        continue;
-      }
-      misfit.pixels[pixel] = 0.0F;
-      field.uncertainty.pixels[pixel] = 0.0F;
-      if (field.reason.pixels[pixel] != static_cast<uint8_t>(Reason::kSolved)) {
-        continue;
-      }
-      system.Gather(column, row);
-      const PlainAnswer answer = PlainWeighted(system, noise);
-      const Eigen::Vector3d n = answer.n.stableNormalized();
-      if (!n.allFinite() || n.isZero()) {
-        field.uncertainty.pixels[pixel] = 180.0F;
-        continue;
-      }
-      for (size_t c = 0; c < 3; ++c) {
-        field.normal[c].pixels[pixel] = static_cast<float>(n[static_cast<Eigen::Index>(c)]);
-      }
-      field.uncertainty.pixels[pixel] = static_cast<float>(std::min(answer.uncertainty_deg, 180.0));
-      misfit.pixels[pixel] = static_cast<float>(answer.misfit);
+  const size_t first = field.reason.Index(0, row_begin);
+  const auto width = static_cast<size_t>(field.reason.width);
+  for (size_t pixel = first; pixel < field.reason.Index(0, row_end); ++pixel) {
+    float& misfit = misfits[pixel - first];
+    if (misfit != kMarked) {
+      continue;
     }
+    misfit = 0.0F;
+    field.uncertainty.pixels[pixel] = 0.0F;
+    field.model.pixels[pixel] = static_cast<uint8_t>(Rung::kNone);
+    if (field.reason.pixels[pixel] != static_cast<uint8_t>(Reason::kSolved)) {
+      continue;
+    }
+    system.Gather(static_cast<int>(pixel % width), static_cast<int>(pixel / width));
+    field.model.pixels[pixel] =
+        static_cast<uint8_t>(system.Count() <= 3 ? Rung::kUnchecked : Rung::kLeastSquares);
+    const PlainAnswer answer = PlainWeighted(system, noise);
+    const Eigen::Vector3d n = answer.n.stableNormalized();
+    if (!n.allFinite() || n.isZero()) {
+      field.uncertainty.pixels[pixel] = 180.0F;
+      continue;
+    }
+    for (size_t c = 0; c < 3; ++c) {
+      field.normal[c].pixels[pixel] = static_cast<float>(n[static_cast<Eigen::Index>(c)]);
+    }
+    // In this order the minimum of 180 and not-a-number, of an infinite scale, is 180.
+    field.uncertainty.pixels[pixel] =
+        static_cast<float>(std::min(180.0, answer.uncertainty_deg * noise_scale));
+    misfit = static_cast<float>(answer.misfit);
   }
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <span>
 
 #include "solver/lambertian.h"
 #include "solver/noise.h"
@@ -21,15 +22,17 @@ struct PlainAnswer {
 
 // Equations (1) to (5), with s = 1, from N^0 of least squares.
 [[nodiscard]] PlainAnswer PlainWeighted(const PixelSystem& system, const StackNoise& noise);
-// Equations (6) to (11).
-[[nodiscard]] PlainAnswer PlainConsensus(const PixelSystem& system);
+// Equations (6) to (11); no answer where the samples that count have lights whose condition number is
+// above max_condition.
+[[nodiscard]] PlainAnswer PlainConsensus(const PixelSystem& system, double max_condition);
 
-// Marks the pixels of this reason in `misfit`, for WeighRowsInDouble to find.
+// Marks the pixels of this reason in `misfits`, one for each pixel of the rows, for
+// WeighRowsInDouble to find.
 void MarkPending(Reason which, int row_begin, int row_end, const NormalField& field,
-                 Image<float>& misfit);
-// PlainWeighted for the marked pixels that are solved by now.
+                 std::span<float> misfits);
+// PlainWeighted for the marked pixels that are solved by now; uncertainties times noise_scale.
 void WeighRowsInDouble(const LightStack& stack, const Rig& rig, const LambertianOptions& options,
-                       const StackNoise& noise, int row_begin, int row_end, NormalField& field,
-                       Image<float>& misfit);
+                       const StackNoise& noise, double noise_scale, int row_begin, int row_end,
+                       NormalField& field, std::span<float> misfits);
 
 }  // namespace sateen

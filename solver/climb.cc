@@ -1,0 +1,234 @@
+#include "solver/climb.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "core/angle.h"
+#include "imaging/color.h"
+#include "solver/consensus.h"
+#include "solver/noise.h"
+#include "solver/plain_ladder.h"
+
+namespace sateen {
+namespace {
+
+constexpr size_t kSumBlock = 512;
+constexpr size_t kBlock = 64;  // pixels that are looked at together
+constexpr float kUnexplainedFactor = 3.0F;
+
+bool NeedsConsensus(const Climb& climb, const NormalField& field, float misfit, size_t pixel) {
+  if (field.samples.pixels[pixel] <= 3) {
+    return false;  // three samples always agree
+  }
+  if (climb.options.mode != LadderMode::kAuto) {
+    return climb.options.mode == LadderMode::kConsensus;
+  }
+  if (misfit <= climb.limit[field.samples.pixels[pixel]]) {
+    return false;
+  }
+  const float albedo = kLuminance[0] * field.albedo[0].pixels[pixel] +
+                       kLuminance[1] * field.albedo[1].pixels[pixel] +
+                       kLuminance[2] * field.albedo[2].pixels[pixel];
+  return field.residual.pixels[pixel] >
+         static_cast<float>(climb.options.explained_residual) * albedo;
+}
+
+Eigen::Vector3f NormalAt(const NormalField& field, size_t pixel) {
+  return {field.normal[0].pixels[pixel], field.normal[1].pixels[pixel],
+          field.normal[2].pixels[pixel]};
+}
+
+// As FastRows::SolveConsensus, in double.
+void SolveConsensusInDouble(const Climb& climb, std::span<const size_t> pixels, NormalField& field,
+                            std::span<uint8_t> agreeing) {
+  PixelSystem system(climb.stack, climb.rig, climb.options.least_squares);
+  const auto width = static_cast<size_t>(field.reason.width);
+  for (size_t j = 0; j < pixels.size(); ++j) {
+    const size_t pixel = pixels[j];
+    system.Gather(static_cast<int>(pixel % width), static_cast<int>(pixel / width));
+    const PlainAnswer answer = PlainConsensus(system, climb.options.least_squares.max_condition);
+    const Eigen::Vector3d n = answer.n.stableNormalized();
+    if (!n.allFinite() || n.isZero()) {
+      agreeing[j] = 0;
+      continue;
+    }
+    for (size_t c = 0; c < 3; ++c) {
+      const auto column = static_cast<Eigen::Index>(c);
+      field.normal[c].pixels[pixel] = static_cast<float>(n[column]);
+      field.albedo[c].pixels[pixel] = static_cast<float>(answer.n_rgb.col(column).norm());
+    }
+    field.residual.pixels[pixel] = static_cast<float>(answer.residual);
+    field.uncertainty.pixels[pixel] = static_cast<float>(std::min(answer.uncertainty_deg, 180.0));
+    agreeing[j] = static_cast<uint8_t>(std::min(answer.agreeing, 255));
+  }
+}
+
+// What float refused, once more in double.
+void SolveRefusedInDouble(const Climb& climb, std::span<const size_t> pixels, NormalField& field,
+                          std::span<uint8_t> agreeing) {
+  std::vector<size_t> places;
+  std::vector<size_t> refused;
+  for (size_t j = 0; j < pixels.size(); ++j) {
+    if (agreeing[j] == 0) {
+      places.push_back(j);
+      refused.push_back(pixels[j]);
+    }
+  }
+  if (refused.empty()) {
+    return;
+  }
+  std::vector<uint8_t> of_refused(refused.size());
+  SolveConsensusInDouble(climb, refused, field, of_refused);
+  for (size_t j = 0; j < places.size(); ++j) {
+    agreeing[places[j]] = of_refused[j];
+  }
+}
+
+// Sum of some hundred uncertainties, in eight lanes, so that it becomes a vector.
+double SumOf(std::span<const float> values) {
+  std::array<float, 8> sums = {};
+  size_t j = 0;
+  for (; j + sums.size() <= values.size(); j += sums.size()) {
+    for (size_t lane = 0; lane < sums.size(); ++lane) {
+      sums[lane] += values[j + lane];
+    }
+  }
+  double total = 0.0;
+  for (; j < values.size(); ++j) {
+    total += static_cast<double>(values[j]);
+  }
+  for (const float sum : sums) {
+    total += static_cast<double>(sum);
+  }
+  return total;
+}
+
+// Appends those pixels of [first, first + misfits.size()) that have to climb.
+void FindClimbers(const Climb& climb, std::span<const float> misfits, size_t first,
+                  const NormalField& field, std::vector<size_t>& pixels) {
+  if (climb.options.mode == LadderMode::kLeastSquares) {
+    return;
+  }
+  // More samples, lower limit.
+  const float lowest = climb.limit[std::min<size_t>(climb.stack.size(), climb.limit.size() - 1)];
+  for (size_t begin = 0; begin < misfits.size(); begin += kBlock) {
+    const std::span<const float> block =
+        misfits.subspan(begin, std::min(kBlock, misfits.size() - begin));
+    int suspects = climb.options.mode == LadderMode::kConsensus ? 1 : 0;
+    for (const float misfit : block) {  // without branches, so that this becomes a vector
+      suspects |= misfit > lowest ? 1 : 0;
+    }
+    for (size_t j = 0; suspects != 0 && j < block.size(); ++j) {
+      const size_t pixel = first + begin + j;
+      if (IsSolved(field, pixel) && NeedsConsensus(climb, field, block[j], pixel)) {
+        pixels.push_back(pixel);
+      }
+    }
+  }
+}
+
+// Rung 2 for the pixels of one piece.
+void ClimbPixels(const Climb& climb, int begin, const FastRows::Geometry& geometry,
+                 std::span<const size_t> pixels, NormalField& field, PieceSummary& summary) {
+  std::vector<Eigen::Vector3f> before;
+  before.reserve(pixels.size());
+  for (const size_t pixel : pixels) {
+    before.push_back(NormalAt(field, pixel));
+  }
+  std::vector<uint8_t> agreeing(pixels.size());
+  if (const FastRows* fast = climb.rows.Fast(); fast != nullptr) {
+    fast->SolveConsensus(begin, geometry, pixels, field, agreeing);
+    if (climb.options.least_squares.backend == Backend::kAuto) {
+      SolveRefusedInDouble(climb, pixels, field, agreeing);
+    }
+  } else {
+    SolveConsensusInDouble(climb, pixels, field, agreeing);
+  }
+  for (size_t j = 0; j < pixels.size(); ++j) {
+    const bool explained = agreeing[j] >= kFewestAgreeing;
+    const Eigen::Vector3f after = NormalAt(field, pixels[j]);
+    const double turned_deg = std::atan2(static_cast<double>(before[j].cross(after).norm()),
+                                         static_cast<double>(before[j].dot(after))) *
+                              kDegPerRad;
+    const double rejected = 1.0 - static_cast<double>(agreeing[j]) /
+                                      static_cast<double>(field.samples.pixels[pixels[j]]);
+    float& uncertainty = field.uncertainty.pixels[pixels[j]];
+    uncertainty = static_cast<float>(
+        std::min(180.0, (1.0 + std::max(0.0, rejected)) *
+                            std::hypot(static_cast<double>(uncertainty),
+                                       static_cast<double>(kUncertaintyOfTurn) * turned_deg)));
+    if (!explained) {
+      uncertainty = std::min(180.0F, uncertainty * kUnexplainedFactor);
+      ++summary.unexplained;
+    }
+    field.model.pixels[pixels[j]] =
+        static_cast<uint8_t>(explained ? Rung::kConsensus : Rung::kUnexplained);
+    summary.turned_deg += turned_deg;
+    summary.robust_deg += static_cast<double>(uncertainty);
+  }
+  summary.robust += static_cast<int64_t>(pixels.size());
+}
+
+}  // namespace
+
+Climb MakeClimb(const LightStack& stack, const Rig& rig, const LadderOptions& options,
+                const LeastSquaresRows& rows, double scale_squared) {
+  Climb climb{stack, rig, options, rows, scale_squared};
+  climb.limit.fill(std::numeric_limits<float>::infinity());
+  for (size_t usable = 4; usable < climb.limit.size(); ++usable) {
+    climb.limit[usable] =
+        static_cast<float>(scale_squared * ChiSquaredQuantile(1.0 - options.false_alarms,
+                                                              static_cast<int>(usable) - 3));
+  }
+  return climb;
+}
+
+void PieceSummary::Add(const PieceSummary& other) {
+  AddCounts(other.counts, counts);
+  least_squares += other.least_squares;
+  robust += other.robust;
+  unexplained += other.unexplained;
+  unchecked += other.unchecked;
+  least_squares_deg += other.least_squares_deg;
+  robust_deg += other.robust_deg;
+  turned_deg += other.turned_deg;
+  climbing_seconds += other.climbing_seconds;
+}
+
+PieceSummary SolveAndClimb(const Climb& climb, int begin, int end, NormalField& field) {
+  PieceSummary summary;
+  const FastRows::Geometry geometry = climb.rows.GeometryOf(begin, end);
+  const size_t first = field.reason.Index(0, begin);
+  const size_t count = field.reason.Index(0, end) - first;
+  const auto memory = std::make_unique_for_overwrite<float[]>(count);
+  const std::span<float> misfits(memory.get(), count);
+  climb.rows.SolveWeighted(begin, end, geometry, std::sqrt(climb.scale_squared), field, misfits,
+                           summary.counts);
+  summary.unchecked = CountOf(static_cast<uint8_t>(Rung::kUnchecked),
+                              std::span(field.model.pixels).subspan(first, count));
+  for (size_t p = 0; p < count; p += kSumBlock) {
+    summary.least_squares_deg += SumOf(
+        std::span(field.uncertainty.pixels).subspan(first + p, std::min(kSumBlock, count - p)));
+  }
+  std::vector<size_t> pixels;
+  FindClimbers(climb, misfits, first, field, pixels);
+  for (const size_t pixel : pixels) {
+    summary.least_squares_deg -= static_cast<double>(field.uncertainty.pixels[pixel]);
+  }
+  summary.least_squares =
+      summary.counts.solved - summary.unchecked - static_cast<int64_t>(pixels.size());
+  if (!pixels.empty()) {
+    const auto start = std::chrono::steady_clock::now();
+    ClimbPixels(climb, begin, geometry, pixels, field, summary);
+    summary.climbing_seconds =
+        std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  }
+  return summary;
+}
+
+}  // namespace sateen

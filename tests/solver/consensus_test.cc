@@ -1,0 +1,189 @@
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+#include <cmath>
+#include <random>
+
+#include "solver/ladder.h"
+#include "tests/solver/ladder_cases.h"
+
+namespace sateen {
+namespace {
+
+using testing::DistantRig;
+using testing::ErrorOf;
+using testing::Forced;
+using testing::MustSolve;
+using testing::Render;
+using testing::SetSample;
+using testing::Spoil;
+using testing::TwoRings;
+
+TEST(SolveLadder, RecoversExactlyFromAsManyOutliersAsLeaveFourSamples) {
+  // Four samples that agree exactly against any number that do not: the product of (9) is least.
+  for (const Backend backend : {Backend::kAuto, Backend::kJacobiSvd}) {
+    for (const int spoiled : {1, 2, 3, 4}) {
+      const Rig rig = TwoRings();
+      RenderedRelief rendered = Render(rig, {40, 30}, 15.0);
+      Spoil(rendered.stack, spoiled, 11);
+      LadderOptions options;
+      options.least_squares.backend = backend;
+      const NormalField field = MustSolve(rendered.stack, rig, options);
+      const ErrorStatistics error = ErrorOf(field, rendered);
+      EXPECT_EQ(error.count, 1200);
+      // The weights of (10) leave an outlier of half a median 1 part in 700 of its pull.
+      EXPECT_LT(error.median, 0.1) << spoiled << " spoiled";
+      EXPECT_LT(error.p99, 3.0) << spoiled << " spoiled";
+      EXPECT_GT(field.summary.robust.pixels, 1190);
+    }
+  }
+}
+
+TEST(SolveLadder, FastAgreesWithThePlainForm) {
+  for (const unsigned seed : {1U, 2U, 3U}) {
+    for (const bool near : {false, true}) {
+      const ImageSize size{37, 21};
+      const Rig rig = near ? RingRig(size) : TwoRings();
+      RenderedRelief rendered = Render(rig, size, 20.0);
+      Spoil(rendered.stack, 3, seed);
+      for (const LadderMode mode : {LadderMode::kLeastSquares, LadderMode::kConsensus}) {
+        const NormalField fast = MustSolve(rendered.stack, rig, Forced(mode));
+        const NormalField plain = MustSolve(rendered.stack, rig, Forced(mode, Backend::kJacobiSvd));
+        int differ = 0;
+        for (size_t p = 0; p < fast.model.pixels.size(); ++p) {
+          const auto at = [&](const Image3& image) {
+            return Eigen::Vector3f(image[0].pixels[p], image[1].pixels[p], image[2].pixels[p]);
+          };
+          const bool same =
+              (at(fast.normal) - at(plain.normal)).norm() < 2e-4F &&
+              (at(fast.albedo) - at(plain.albedo)).norm() < 1e-3F * at(plain.albedo).norm() &&
+              std::abs(fast.uncertainty.pixels[p] - plain.uncertainty.pixels[p]) <
+                  0.01F * plain.uncertainty.pixels[p] &&
+              fast.model.pixels[p] == plain.model.pixels[p];
+          differ += same ? 0 : 1;
+        }
+        // Two triples that cost the same in double may not in float.
+        EXPECT_LE(differ, 4) << "seed " << seed << " near " << near << " mode " << Name(mode);
+      }
+    }
+  }
+}
+
+TEST(SolveLadder, WhiteHighlightsOnColourCostNothing) {
+  // A lobe on every sample, different from light to light, that is white: no four samples of
+  // luminance agree, all of the departure from grey do.
+  const Rig rig = TwoRings();
+  RenderedRelief rendered = Render(rig, {40, 30}, 15.0);
+  std::mt19937 random(4);
+  std::uniform_real_distribution<float> lobe(0.02F, 0.3F);
+  for (size_t p = 0; p < rendered.albedo[0].pixels.size(); ++p) {
+    for (LightFrame& frame : rendered.stack) {
+      const float body = frame.rgb[1].pixels[p] / rendered.albedo[1].pixels[p];
+      const float white = lobe(random);
+      const std::array<float, 3> red = {0.5F, 0.1F, 0.12F};
+      for (size_t c = 0; c < 3; ++c) {
+        frame.rgb[c].pixels[p] = red[c] * body + white;
+      }
+    }
+  }
+  const ErrorStatistics error =
+      ErrorOf(MustSolve(rendered.stack, rig, Forced(LadderMode::kConsensus)), rendered);
+  EXPECT_LT(error.p99, 0.01);
+}
+
+TEST(SolveLadder, PixelsInWhichNoFourSamplesAgreeAreMarked) {
+  const Rig rig = TwoRings();
+  RenderedRelief rendered = Render(rig, {40, 30}, 15.0);
+  std::mt19937 random(8);
+  std::uniform_real_distribution<float> any(-3.0F, 3.0F);
+  for (size_t p = 0; p < 1200; ++p) {
+    for (LightFrame& frame : rendered.stack) {
+      SetSample(frame, p, std::exp(any(random)));
+    }
+  }
+  const NormalField field = MustSolve(rendered.stack, rig);
+  int doubtful = 0;
+  for (size_t p = 0; p < 1200; ++p) {
+    doubtful += field.model.pixels[p] == static_cast<uint8_t>(Rung::kUnexplained) ||
+                        field.uncertainty.pixels[p] > 10.0F
+                    ? 1
+                    : 0;
+  }
+  EXPECT_GT(doubtful, 900);  // in the others four of ten agree by chance
+  EXPECT_GT(field.summary.unexplained, 0);
+}
+
+// Coloured pixels of which each has its own number of usable samples and noise of its own. In every
+// other block of 16 all samples but one have a white highlight, beside which that one counts as dark:
+// there fewer samples of luminance are in the band than of the departure from grey.
+RenderedRelief ColouredOfSixToEightSamples(const Rig& rig, ImageSize size, unsigned seed) {
+  RenderedRelief rendered = Render(rig, size, 15.0);
+  std::mt19937 random(seed);
+  std::normal_distribution<float> grain(1.0F, 0.2F);
+  std::uniform_real_distribution<float> lobe(0.6F, 1.2F);
+  for (size_t p = 0; p < size.PixelCount(); ++p) {
+    const size_t unusable = random() % 3;
+    for (size_t k = 0; k < rendered.stack.size(); ++k) {
+      const float body = rendered.stack[k].rgb[1].pixels[p] / rendered.albedo[1].pixels[p];
+      const float white = p / 16 % 2 == 0 && k != unusable ? lobe(random) : 0.0F;
+      const std::array<float, 3> red = {0.5F, 0.2F, 0.25F};
+      for (size_t c = 0; c < 3; ++c) {
+        rendered.stack[k].rgb[c].pixels[p] =
+            k < unusable ? NAN : red[c] * body * grain(random) + white;
+      }
+    }
+  }
+  return rendered;
+}
+
+TEST(Consensus, APixelsAnswerDoesNotDependOnItsNeighbours) {
+  for (const int count : {6, 7, 8}) {
+    const ImageSize size{160, 100};
+    const Rig rig = DistantRig(DistantRing(count, 40.0 * kRadPerDeg));
+    const RenderedRelief rendered = ColouredOfSixToEightSamples(rig, size, 3);
+    const LadderOptions options = Forced(LadderMode::kConsensus);
+    const NormalField all = MustSolve(rendered.stack, rig, options);
+    for (const size_t period : {2U, 3U, 5U, 17U, 97U}) {
+      Mask mask(size, 0);
+      for (size_t p = period / 2; p < mask.pixels.size(); p += period) {
+        mask.pixels[p] = 255;
+      }
+      const NormalField some = SolveLadder(rendered.stack, rig, mask, options).value();
+      int differ = 0;
+      for (size_t p = period / 2; p < mask.pixels.size(); p += period) {
+        bool same = all.uncertainty.pixels[p] == some.uncertainty.pixels[p] &&
+                    all.residual.pixels[p] == some.residual.pixels[p] &&
+                    all.model.pixels[p] == some.model.pixels[p];
+        for (size_t c = 0; c < 3; ++c) {
+          same = same && all.normal[c].pixels[p] == some.normal[c].pixels[p] &&
+                 all.albedo[c].pixels[p] == some.albedo[c].pixels[p];
+        }
+        differ += same ? 0 : 1;
+      }
+      EXPECT_EQ(differ, 0) << count << " lights, every pixel of " << period;
+    }
+  }
+}
+
+TEST(Consensus, WhatFloatRefusesIsSolvedInDouble) {
+  // Nine lights within 1 degree: condition number 81, which float vectors do not hold.
+  Lights lights = DistantRing(9, 1.0 * kRadPerDeg);
+  const Rig rig = DistantRig(std::move(lights));
+  RenderedRelief rendered = Render(rig, {20, 10}, 15.0);
+  for (size_t p = 0; p < 200; ++p) {
+    SetSample(rendered.stack[p % 9], p, 0.05F);
+  }
+  const NormalField automatic = MustSolve(rendered.stack, rig);
+  const NormalField plain =
+      MustSolve(rendered.stack, rig, Forced(LadderMode::kAuto, Backend::kJacobiSvd));
+  EXPECT_EQ(automatic.summary.robust.pixels, 200);
+  EXPECT_EQ(automatic.summary.unexplained, 0);
+  EXPECT_EQ(automatic.normal[0].pixels, plain.normal[0].pixels);
+  EXPECT_EQ(automatic.model.pixels, plain.model.pixels);
+  const NormalField fast =
+      MustSolve(rendered.stack, rig, Forced(LadderMode::kAuto, Backend::kFast));
+  EXPECT_EQ(fast.summary.solved, 0);
+}
+
+}  // namespace
+}  // namespace sateen

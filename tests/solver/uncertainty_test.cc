@@ -1,0 +1,122 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "solver/ladder.h"
+#include "tests/solver/ladder_cases.h"
+
+namespace sateen {
+namespace {
+
+using testing::DistantRig;
+using testing::MustSolve;
+using testing::Noisy;
+using testing::NoisyScene;
+using testing::ReasonAt;
+using testing::RippleOf;
+using testing::TwoRings;
+
+TEST(SolveLadder, UncertaintyIsTheActualErrorOverTwentyScenes) {
+  // A factor of 1.2 in the uncertainty would be outside.
+  for (unsigned scene_number = 0; scene_number < 20; ++scene_number) {
+    const Noisy scene = NoisyScene(1.0 + scene_number, scene_number, 5.0 + scene_number);
+    for (const bool known : {true, false}) {
+      LadderOptions options;
+      if (known) {
+        options.noise = scene.noise;
+      }
+      const NormalField field = MustSolve(scene.rendered.stack, scene.rig, options);
+      Image<float> error;
+      ASSERT_TRUE(AngularErrorDeg(field, scene.rendered.normal, &error));
+      double squares = 0.0;
+      int64_t inside = 0;
+      int64_t count = 0;
+      for (size_t p = 0; p < error.pixels.size(); ++p) {
+        const double z = static_cast<double>(error.pixels[p] / field.uncertainty.pixels[p]);
+        squares += z * z;
+        inside += z <= 1.96 ? 1 : 0;
+        ++count;
+      }
+      const double standardised = std::sqrt(squares / static_cast<double>(count));
+      // Unknown: read noise counts as shot noise, and the 5th percentile is one of 800 pixels.
+      EXPECT_NEAR(standardised, 1.0, known ? 0.05 : 0.1)
+          << scene_number << (known ? "" : " unknown");
+      EXPECT_GE(inside, 0.94 * static_cast<double>(count)) << scene_number;
+    }
+  }
+}
+
+// Root mean square of the actual angles over that of the uncertainties, where rung 1 gives them; 1 =
+// honest.
+double ActualOverReported(const NormalField& field, const RenderedRelief& truth) {
+  Image<float> error;
+  EXPECT_TRUE(AngularErrorDeg(field, truth.normal, &error));
+  double actual = 0.0;
+  double reported = 0.0;
+  for (size_t p = 0; p < error.pixels.size(); ++p) {
+    if (ReasonAt(field, p) == Reason::kSolved &&
+        field.model.pixels[p] <= static_cast<uint8_t>(Rung::kUnchecked)) {
+      actual += std::pow(static_cast<double>(error.pixels[p]), 2.0);
+      reported += std::pow(static_cast<double>(field.uncertainty.pixels[p]), 2.0);
+    }
+  }
+  return std::sqrt(actual / reported);
+}
+
+TEST(SolveLadder, ASmallMaskInALargeImageHasItsOwnNoise) {
+  const Rig rig = TwoRings();
+  const ImageSize size{1008, 690};  // every 42nd pixel of the image would miss the mask
+  const RenderedRelief rendered = RippleOf({.full_scale = 2.0}, rig, size);
+  Mask mask(size, 0);
+  for (int y = 300; y < 310; ++y) {
+    for (int x = 505; x < 515; ++x) {
+      mask.At(x, y) = 255;
+    }
+  }
+  const NormalField field = SolveLadder(rendered.stack, rig, mask).value();
+  EXPECT_EQ(field.summary.solved, 100);
+  EXPECT_NEAR(ActualOverReported(field, rendered), 1.0, 0.4);
+}
+
+TEST(SolveLadder, NeighboursTellTheNoiseOfThreeLights) {
+  const Rig rig = DistantRig(DistantRing(3, 40.0 * kRadPerDeg));
+  const RenderedRelief rendered = RippleOf({.full_scale = 2.0}, rig, {160, 100});
+  const NormalField field = MustSolve(rendered.stack, rig);
+  EXPECT_EQ(field.summary.unchecked, 16000);
+  EXPECT_GT(ActualOverReported(field, rendered), 0.5);
+  EXPECT_LT(ActualOverReported(field, rendered), 1.5);
+}
+
+TEST(SolveLadder, UncertaintyIsUnknownWhereNothingTellsOfTheNoise) {
+  const Rig rig = DistantRig(DistantRing(3, 40.0 * kRadPerDeg));
+  const RenderedRelief rendered = RippleOf({.full_scale = 2.0}, rig, {2, 3});  // no neighbours
+  Mask mask({2, 3}, 255);
+  mask.At(0, 0) = 0;
+  const NormalField field = SolveLadder(rendered.stack, rig, mask).value();
+  EXPECT_EQ(field.uncertainty.At(0, 0), 0.0F);
+  EXPECT_EQ(field.uncertainty.At(1, 0), 180.0F);
+  EXPECT_EQ(field.summary.least_squares.mean_uncertainty_deg, 180.0);
+  EXPECT_EQ(field.summary.noise_scale, 0.0);
+}
+
+TEST(SolveLadder, SmoothFramesOfEightBitsAreNotWithoutNoise) {
+  const SensorModel eight_bits{.bits = 8, .electrons = 1e9, .read_noise_electrons = 0.0};
+  for (const int count : {3, 4, 10}) {
+    const Rig rig = count == 10 ? TwoRings() : DistantRig(DistantRing(count, 40.0 * kRadPerDeg));
+    for (const double period_px : {40.0, 400.0}) {
+      const RenderedRelief rendered = RenderRelief({.shape = ReliefShape::kRipple,
+                                                    .max_slope_rad = 15.0 * kRadPerDeg,
+                                                    .ripple_period_px = period_px,
+                                                    .sensor = eight_bits},
+                                                   rig, {400, 300})
+                                          .value();
+      const NormalField field = MustSolve(rendered.stack, rig);
+      EXPECT_GT(ActualOverReported(field, rendered), 1.0 / 3.0) << count << ", " << period_px;
+      EXPECT_LT(ActualOverReported(field, rendered), 3.0) << count << ", " << period_px;
+      EXPECT_LT(field.summary.robust.pixels, 120000 / 20) << count << ", " << period_px;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace sateen
