@@ -47,7 +47,7 @@ Rgb8 Overview(const NormalField& field, const Image3& normal, const LightFrame& 
                  [](uint8_t reason) { return reason == static_cast<uint8_t>(Reason::kSolved); });
   const Image<float>& quality = angular_error_deg ? *angular_error_deg : field.residual;
   const float top = TopOf(quality, solved);
-  const std::string heat = angular_error_deg ? HeatCaption("error from truth", top, "degrees")
+  const std::string heat = angular_error_deg ? HeatCaption("error from truth", top, "deg")
                                              : HeatCaption("residual", top, "");
   std::vector<Rgb8> panels;
   for (const auto& [panel, caption] :
