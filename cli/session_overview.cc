@@ -141,8 +141,8 @@ Result<std::vector<Rgb8>> MapPanels(const fs::path& maps) {
         return add("albedo.exr", "albedo", [](const Image3& map) { return ShowLinear(map); });
       });
   for (const auto& [file, what, unit] : {std::tuple{"residual.exr", "residual", ""},
-                                         std::tuple{"uncertainty.exr", "uncertainty", "degrees"},
-                                         std::tuple{"error.exr", "error from truth", "degrees"}}) {
+                                         std::tuple{"uncertainty.exr", "uncertainty", "deg"},
+                                         std::tuple{"error.exr", "error", "deg"}}) {
     std::error_code ignored;
     if (status && fs::exists(maps / file, ignored)) {
       status = ReadPhoto(maps / file).map([&, what = what, unit = unit](const Photo& map) {

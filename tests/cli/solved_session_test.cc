@@ -33,6 +33,7 @@ class SolvedSession : public ::testing::Test {
     for (const auto& [name, radius] : {std::pair{"dome", "240"}, std::pair{"hill", "300"}}) {
       testing::WriteText(Path(std::string(name) + ".json"),
                          std::string(R"({"schema": "sateen.scene/1", "rig": "rig.json",
+                           "materials": {"surface": {"texture": {"kind": "waves", "min": 0.2, "max": 0.8, "period_mm": 100}}},
                            "surface": {"shape": "sphere", "edge_deg": 30, "radius_mm": )") +
                              radius + "}}");
       const RunResult run =

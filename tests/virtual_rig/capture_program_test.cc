@@ -142,7 +142,7 @@ TEST_F(CaptureProgram, PreviewByADaemonHearsCtrlC) {
                 "unset SATEEN_CAMERA SATEEN_PORT\n" +
                 "while ! [ -S $SATEEN_SOCKET ]; do sleep 0.05; done\n" +
                 "timeout --preserve-status -s INT 2 " + kSateen + " preview -o " + look +
-                " --light 3 --exposure 6s\n" + "echo preview ended with $?\n" +
+                " --light 3 --exposure 4s\n" + "echo preview ended with $?\n" +
                 Capture("--exposure 1/50 --dry-run") + "\n" + "kill $daemon; wait $daemon\n");
   const ShellResult ended = OnRig("", "sh " + (folder_.Path() / "daemon.sh").string());
   EXPECT_THAT(ended.out, HasSubstr("preview ended with 6"));
