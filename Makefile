@@ -15,12 +15,13 @@ LIGHTS ?= 14
 IMAGE_14 = sateen-controller.hex
 IMAGE_16 = sateen-controller-16.hex
 SECONDS ?= 60
+SCENES = twill-ring10 knit linen-three-rings satin-ggx black-velvet rib-shadows
 CTEST = ctest --output-on-failure --no-tests=error -j$(JOBS)
 # Tracked files and new ones that are not ignored.
 OUR_SOURCES = git ls-files -z --cached --others --exclude-standard '*.h' '*.cc' '*.c'
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo programs build test bench firmware flash fuzz format format-check tidy asan tsan clean
+.PHONY: help setup demo programs build test bench accuracy firmware flash fuzz format format-check tidy asan tsan clean
 
 help:  ## This list
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 16
@@ -46,6 +47,10 @@ test: build  ## Build and run all tests
 bench: build  ## Speed against error of the whole solve, then the micro-benchmarks
 	@build/release/bin/sateen bench solve
 	@for program in build/release/bin/*_bench; do echo "== $$program"; $$program || exit 1; done
+
+accuracy: programs  ## Write docs/accuracy.md and its plot anew; with the public data sets: SATEEN_DATA=FOLDER
+	@build/release/bin/sateen bench accuracy $(SCENES:%=--scene samples/scenes/%.json) \
+	    --markdown docs/accuracy.md --plot docs/images/accuracy.svg
 
 firmware: setup  ## The LED board's firmware: build/firmware/sateen-controller.hex, -16.hex
 	@cmake -S firmware -B build/firmware --toolchain $(CURDIR)/firmware/avr.cmake -G Ninja --log-level=WARNING

@@ -6,6 +6,7 @@
 #include <iostream>
 #include <new>
 
+#include "cli/bench_accuracy.h"
 #include "cli/bench_calibrate.h"
 #include "cli/bench_simulate.h"
 #include "cli/bench_solve.h"
@@ -59,6 +60,8 @@ int Run(int argc, char** argv) {
   bench->require_subcommand(1);
   sateen::cli::BenchSolveArgs bench_solve;
   sateen::cli::AddBenchSolve(*bench, bench_solve);
+  sateen::cli::BenchAccuracyArgs bench_accuracy;
+  sateen::cli::AddBenchAccuracy(*bench, bench_accuracy);
   sateen::cli::BenchSimulateArgs bench_simulate;
   sateen::cli::AddBenchSimulate(*bench, bench_simulate);
   sateen::cli::BenchCalibrateArgs bench_calibrate;
@@ -96,6 +99,8 @@ int Run(int argc, char** argv) {
     status = RunServe(serve, task, std::cout, std::cerr);
   } else if (app.got_subcommand("session")) {
     status = RunSession(app, session, task, std::cout, std::cerr);
+  } else if (bench->got_subcommand("accuracy")) {
+    status = RunBenchAccuracy(bench_accuracy, task, std::cout, std::cerr);
   } else if (bench->got_subcommand("simulate")) {
     status = RunBenchSimulate(bench_simulate, task, std::cout, std::cerr);
   } else if (bench->got_subcommand("calibrate")) {

@@ -125,8 +125,8 @@ class FileStore final : public MosaicStore {
 };
 
 Result<std::unique_ptr<MosaicStore>> OpenStore(const fs::path& scratch_dir, ImageSize size_px,
-                                               size_t frames) {
-  if (sizeof(uint16_t) * size_px.PixelCount() * frames <= kMosaicBytesInMemory) {
+                                               size_t frames, std::uintmax_t in_memory) {
+  if (sizeof(uint16_t) * size_px.PixelCount() * frames <= in_memory) {
     return std::make_unique<MemoryStore>(size_px, frames);
   }
   return FileStore::Open(scratch_dir, size_px, frames)
@@ -159,6 +159,7 @@ Result<MosaicFrame> FrameOf(const FrameFile& file, const RawReadings& readings) 
 
 // What is known once the first frame is decoded, and one entry for each frame.
 struct Decoding {
+  MosaicMemory memory;
   std::vector<FrameFile> files;  // lit, then dark
   std::vector<MosaicFrame> frames;
   std::vector<std::string> hashes;
@@ -191,7 +192,7 @@ Status DecodeFrame(size_t k, const fs::path& scratch_dir, Decoding& decoding) {
       decoding.size_px = readings.size_px;
       decoding.cfa = readings.cfa;
       Result<std::unique_ptr<MosaicStore>> store =
-          OpenStore(scratch_dir, readings.size_px, decoding.files.size());
+          OpenStore(scratch_dir, readings.size_px, decoding.files.size(), decoding.memory.readings);
       if (!store) {
         return tl::unexpected(store.error());
       }
@@ -220,7 +221,7 @@ Status DecodeAll(const fs::path& scratch_dir, const Task& task, Decoding& decodi
   task.Advance();
   const std::uintmax_t bytes = sizeof(uint16_t) * decoding.size_px.PixelCount();
   const int at_once = static_cast<int>(std::clamp<std::uintmax_t>(
-      kDecodedBytesAtOnce / bytes, 1, static_cast<std::uintmax_t>(task.ThreadCount())));
+      decoding.memory.decoded / bytes, 1, static_cast<std::uintmax_t>(task.ThreadCount())));
   std::vector<Status> outcomes(decoding.files.size());
   const Status ran =
       ParallelFor(count - 1, 1, task.WithThreads(at_once), [&](int begin, int /*end*/) {
@@ -257,8 +258,8 @@ std::optional<std::string> WhyNoMosaics(const CapturePlan& plan, bool by_noise) 
 }
 
 Result<LoadedMosaics> LoadMosaics(const CapturePlan& plan, const fs::path& scratch_dir,
-                                  const Task& task) {
-  Decoding decoding;
+                                  const Task& task, const MosaicMemory& memory) {
+  Decoding decoding{.memory = memory};
   for (const LightFiles& files : plan.lit) {
     decoding.files.push_back(files.front());
   }

@@ -26,16 +26,18 @@ struct LoadedMosaics {
 // `by_noise`: the solve weighs them by the sensor's noise, which must be known.
 [[nodiscard]] std::optional<std::string> WhyNoMosaics(const CapturePlan& plan, bool by_noise);
 
-/// Decodes the frames of a capture whose WhyNoMosaics() is nothing. Up to kMosaicBytesInMemory they
-/// stay in memory; beyond they go to a scratch file in `scratch_dir`, row by row as the decoder has
-/// them, and no more frames are decoded at once than kDecodedBytesAtOnce holds (but one).
+// How much of it lies in memory.
+struct MosaicMemory {
+  std::uintmax_t readings = std::uintmax_t{256} << 20;  // beyond, they go to a file
+  std::uintmax_t decoded = std::uintmax_t{640} << 20;   // at the same time, but one frame at least
+};
+
+/// Decodes the frames of a capture whose WhyNoMosaics() is nothing. Where the readings are more than
+/// memory.readings they go to a scratch file in `scratch_dir`, row by row as the decoder has them.
 ///
 /// Errors  as LoadFrames(); kIo where the scratch file cannot be written, with the room it needs
 [[nodiscard]] Result<LoadedMosaics> LoadMosaics(const CapturePlan& plan,
                                                 const std::filesystem::path& scratch_dir,
-                                                const Task& task);
-
-inline constexpr std::uintmax_t kMosaicBytesInMemory = std::uintmax_t{256} << 20;
-inline constexpr std::uintmax_t kDecodedBytesAtOnce = std::uintmax_t{640} << 20;
+                                                const Task& task, const MosaicMemory& memory = {});
 
 }  // namespace sateen
