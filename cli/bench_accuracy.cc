@@ -30,7 +30,7 @@ namespace fs = std::filesystem;
 
 // Others' estimators take up to 0.2 ms a pixel.
 constexpr int64_t kMostPixelsForComparators = 60'000;
-// Of a direction's error in two equal parts 95 of 100 are below this many of its deviations.
+// Uncertainties within which at least 95 of 100 errors lie (solver/ladder.h).
 constexpr float kInterval95 = 1.96F;
 constexpr ImageSize kReliefPx = {640, 480};
 
