@@ -35,6 +35,8 @@ inline constexpr int kFewestAgreeing = 4;
 inline constexpr float kUncertaintyFactor = 4.0F;
 inline constexpr float kLeastModelUncertaintyDeg = 3.0F;
 // (12): of the angle between two estimates that disagree, so much is doubt about the better one.
+// What a cloth differs by from the sheen it is given.
+inline constexpr double kSheenUncertaintyDeg = 0.5;
 inline constexpr float kUncertaintyOfTurn = 0.4F;
 
 }  // namespace sateen
