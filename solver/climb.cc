@@ -178,13 +178,13 @@ void ClimbPixels(const Climb& climb, int begin, const FastRows::Geometry& geomet
   summary.robust += static_cast<int64_t>(pixels.size());
 }
 
-// Rung 3 for the pixels of rows from `begin` on that the scene's sheen explains better than rung 1.
-void SolveUnderSheen(const Climb& climb, size_t first, std::span<const float> misfits,
-                     NormalField& field, PieceSummary& summary) {
+// Rung 3 for those of `count` pixels that the scene's sheen explains, also where rung 1 does so by chance.
+void SolveUnderSheen(const Climb& climb, size_t first, size_t count, NormalField& field,
+                     PieceSummary& summary) {
   PixelSystem system(climb.stack, climb.rig, climb.options.least_squares);
   const auto width = static_cast<size_t>(field.reason.width);
   const double noise_scale = std::sqrt(climb.scale_squared);
-  for (size_t j = 0; j < misfits.size(); ++j) {
+  for (size_t j = 0; j < count; ++j) {
     const size_t pixel = first + j;
     const auto column = static_cast<int>(pixel % width);
     const auto row = static_cast<int>(pixel / width);
@@ -195,8 +195,8 @@ void SolveUnderSheen(const Climb& climb, size_t first, std::span<const float> mi
     system.Gather(column, row);
     const SheenAnswer answer =
         v ? SolveSheen(system, climb.noise, *climb.sheen, *v) : SheenAnswer{};
-    if (answer.n.isZero() || !(answer.misfit < static_cast<double>(misfits[j])) ||
-        answer.misfit > static_cast<double>(climb.limit[field.samples.pixels[pixel]])) {
+    if (answer.n.isZero() ||
+        !(answer.misfit <= static_cast<double>(climb.limit[field.samples.pixels[pixel]]))) {
       continue;
     }
     const Eigen::Vector3d n = answer.n.normalized();
@@ -260,7 +260,7 @@ PieceSummary SolveAndClimb(const Climb& climb, int begin, int end, NormalField& 
                            summary.counts);
   if (climb.sheen) {
     summary.sheen_seconds =
-        SecondsOf([&] { SolveUnderSheen(climb, first, misfits, field, summary); });
+        SecondsOf([&] { SolveUnderSheen(climb, first, count, field, summary); });
   }
   summary.unchecked = CountOf(static_cast<uint8_t>(Rung::kUnchecked),
                               std::span(field.model.pixels).subspan(first, count));

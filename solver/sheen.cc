@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <utility>
 #include <vector>
 
 #include "core/angle.h"
@@ -32,7 +33,9 @@ constexpr double kMostOverLimit = 4.0;
 constexpr std::array kAlphas = {0.3, 0.4, 0.5, 0.6, 0.75, 0.9};
 constexpr std::array kStrengths = {0.35, 0.7, 1.4, 2.8};
 constexpr double kLeastAlpha = 0.1;
-constexpr int kRefinements = 4;
+constexpr int kRefinements = 6;
+constexpr std::array<std::pair<int, int>, 8> kNeighbours = {
+    {{1, 0}, {-1, 0}, {0, 1}, {0, -1}, {1, -1}, {-1, 1}, {1, 1}, {-1, -1}}};
 
 // Equation (13)'s s_k, in units of radiance.
 Eigen::VectorXd SheenOf(const PixelSystem& system, const Sheen& sheen, const Eigen::Vector3d& n,
@@ -203,11 +206,13 @@ std::optional<Sheen> FindSheen(const LightStack& stack, const Rig& rig,
   double strength_factor = std::sqrt(2.0);
   for (int j = 0; j < kRefinements; ++j) {
     for (bool moved = true; moved;) {
+      moved = false;
       const Sheen at = best;
-      moved = attempt({std::min(1.0, at.alpha + alpha_step), at.strength}) ||
-              attempt({std::max(kLeastAlpha, at.alpha - alpha_step), at.strength}) ||
-              attempt({at.alpha, at.strength * strength_factor}) ||
-              attempt({at.alpha, at.strength / strength_factor});
+      // Eight neighbours, because roughness and strength make up for each other along a narrow valley.
+      for (const auto& [a, b] : kNeighbours) {
+        moved |= attempt({std::clamp(at.alpha + a * alpha_step, kLeastAlpha, 1.0),
+                          at.strength * std::pow(strength_factor, b)});
+      }
     }
     alpha_step *= 0.5;
     strength_factor = std::sqrt(strength_factor);
