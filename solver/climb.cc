@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <memory>
 #include <span>
@@ -24,6 +25,9 @@ constexpr float kUnexplainedFactor = 3.0F;
 bool NeedsConsensus(const Climb& climb, const NormalField& field, float misfit, size_t pixel) {
   if (field.samples.pixels[pixel] <= 3) {
     return false;  // three samples always agree
+  }
+  if (field.model.pixels[pixel] == static_cast<uint8_t>(Rung::kSheen)) {
+    return false;
   }
   if (climb.options.mode != LadderMode::kAuto) {
     return climb.options.mode == LadderMode::kConsensus;
@@ -174,11 +178,53 @@ void ClimbPixels(const Climb& climb, int begin, const FastRows::Geometry& geomet
   summary.robust += static_cast<int64_t>(pixels.size());
 }
 
+// Rung 3 for those of `count` pixels that the scene's sheen explains, also where rung 1 does so by chance.
+void SolveUnderSheen(const Climb& climb, size_t first, size_t count, NormalField& field,
+                     PieceSummary& summary) {
+  PixelSystem system(climb.stack, climb.rig, climb.options.least_squares);
+  const auto width = static_cast<size_t>(field.reason.width);
+  const double noise_scale = std::sqrt(climb.scale_squared);
+  for (size_t j = 0; j < count; ++j) {
+    const size_t pixel = first + j;
+    const auto column = static_cast<int>(pixel % width);
+    const auto row = static_cast<int>(pixel / width);
+    if (!IsSolved(field, pixel)) {
+      continue;
+    }
+    const std::optional<Eigen::Vector3d> v = ViewOf(climb.rig, column, row);
+    system.Gather(column, row);
+    const SheenAnswer answer =
+        v ? SolveSheen(system, climb.noise, *climb.sheen, *v) : SheenAnswer{};
+    if (answer.n.isZero() ||
+        !(answer.misfit <= static_cast<double>(climb.limit[field.samples.pixels[pixel]]))) {
+      continue;
+    }
+    const Eigen::Vector3d n = answer.n.normalized();
+    for (size_t c = 0; c < 3; ++c) {
+      const auto column_of = static_cast<Eigen::Index>(c);
+      field.normal[c].pixels[pixel] = static_cast<float>(n[column_of]);
+      field.albedo[c].pixels[pixel] = static_cast<float>(answer.albedo[column_of]);
+    }
+    field.residual.pixels[pixel] = static_cast<float>(answer.residual);
+    field.uncertainty.pixels[pixel] = static_cast<float>(
+        std::min(180.0, std::hypot(answer.uncertainty_deg * noise_scale, kSheenUncertaintyDeg)));
+    field.model.pixels[pixel] = static_cast<uint8_t>(Rung::kSheen);
+    summary.sheen_deg += static_cast<double>(field.uncertainty.pixels[pixel]);
+    ++summary.sheen;
+  }
+}
+
+double SecondsOf(const std::function<void()>& work) {
+  const auto start = std::chrono::steady_clock::now();
+  work();
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
 }  // namespace
 
 Climb MakeClimb(const LightStack& stack, const Rig& rig, const LadderOptions& options,
-                const LeastSquaresRows& rows, double scale_squared) {
-  Climb climb{stack, rig, options, rows, scale_squared};
+                const LeastSquaresRows& rows, const StackNoise& noise, double scale_squared) {
+  Climb climb{stack, rig, options, rows, noise, scale_squared};
   climb.limit.fill(std::numeric_limits<float>::infinity());
   for (size_t usable = 4; usable < climb.limit.size(); ++usable) {
     climb.limit[usable] =
@@ -192,12 +238,15 @@ void PieceSummary::Add(const PieceSummary& other) {
   AddCounts(other.counts, counts);
   least_squares += other.least_squares;
   robust += other.robust;
+  sheen += other.sheen;
   unexplained += other.unexplained;
   unchecked += other.unchecked;
   least_squares_deg += other.least_squares_deg;
   robust_deg += other.robust_deg;
+  sheen_deg += other.sheen_deg;
   turned_deg += other.turned_deg;
   climbing_seconds += other.climbing_seconds;
+  sheen_seconds += other.sheen_seconds;
 }
 
 PieceSummary SolveAndClimb(const Climb& climb, int begin, int end, NormalField& field) {
@@ -209,24 +258,27 @@ PieceSummary SolveAndClimb(const Climb& climb, int begin, int end, NormalField& 
   const std::span<float> misfits(memory.get(), count);
   climb.rows.SolveWeighted(begin, end, geometry, std::sqrt(climb.scale_squared), field, misfits,
                            summary.counts);
+  if (climb.sheen) {
+    summary.sheen_seconds =
+        SecondsOf([&] { SolveUnderSheen(climb, first, count, field, summary); });
+  }
   summary.unchecked = CountOf(static_cast<uint8_t>(Rung::kUnchecked),
                               std::span(field.model.pixels).subspan(first, count));
   for (size_t p = 0; p < count; p += kSumBlock) {
     summary.least_squares_deg += SumOf(
         std::span(field.uncertainty.pixels).subspan(first + p, std::min(kSumBlock, count - p)));
   }
+  summary.least_squares_deg -= summary.sheen_deg;
   std::vector<size_t> pixels;
   FindClimbers(climb, misfits, first, field, pixels);
   for (const size_t pixel : pixels) {
     summary.least_squares_deg -= static_cast<double>(field.uncertainty.pixels[pixel]);
   }
-  summary.least_squares =
-      summary.counts.solved - summary.unchecked - static_cast<int64_t>(pixels.size());
+  summary.least_squares = summary.counts.solved - summary.unchecked - summary.sheen -
+                          static_cast<int64_t>(pixels.size());
   if (!pixels.empty()) {
-    const auto start = std::chrono::steady_clock::now();
-    ClimbPixels(climb, begin, geometry, pixels, field, summary);
     summary.climbing_seconds =
-        std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+        SecondsOf([&] { ClimbPixels(climb, begin, geometry, pixels, field, summary); });
   }
   return summary;
 }

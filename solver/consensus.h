@@ -2,7 +2,7 @@
 
 namespace sateen {
 
-// Constants of equations (6) to (11) of solver/ladder.h, shared by the plain form and the kernel.
+// Constants of equations (6) to (12) of solver/ladder.h, shared by the plain form and the kernel.
 // Found on the DiLiGenT ball, the rendered bunny and random choices of their lights; docs/decisions.md
 // has the figures.
 
@@ -36,5 +36,8 @@ inline constexpr float kUncertaintyFactor = 4.0F;
 inline constexpr float kLeastModelUncertaintyDeg = 3.0F;
 // (12): of the angle between two estimates that disagree, so much is doubt about the better one.
 inline constexpr float kUncertaintyOfTurn = 0.4F;
+
+// What a cloth differs by from the sheen it is given.
+inline constexpr double kSheenUncertaintyDeg = 0.5;
 
 }  // namespace sateen

@@ -35,7 +35,7 @@ double SecondsSince(Clock::time_point start) {
 
 // Share of the model's error that rung 1 gets where so many pixels climbed.
 double DoubtOf(const PieceSummary& total) {
-  const int64_t solved = total.least_squares + total.unchecked + total.robust;
+  const int64_t solved = total.least_squares + total.unchecked + total.robust + total.sheen;
   const double share =
       static_cast<double>(total.robust) / static_cast<double>(std::max<int64_t>(solved, 1));
   return std::clamp((share - kUndoubtedShare) / (kDoubtfulShare - kUndoubtedShare), 0.0, 1.0);
@@ -94,9 +94,12 @@ void Report(const PieceSummary& total, SolveSummary& summary) {
   };
   summary.robust = {total.robust, total.climbing_seconds / std::max(1, summary.threads),
                     mean(total.robust_deg, total.robust)};
-  summary.least_squares = {total.least_squares + total.unchecked,
-                           std::max(0.0, summary.seconds - summary.robust.seconds),
-                           mean(total.least_squares_deg, total.least_squares + total.unchecked)};
+  summary.sheen = {total.sheen, total.sheen_seconds / std::max(1, summary.threads),
+                   mean(total.sheen_deg, total.sheen)};
+  summary.least_squares = {
+      total.least_squares + total.unchecked,
+      std::max(0.0, summary.seconds - summary.robust.seconds - summary.sheen.seconds),
+      mean(total.least_squares_deg, total.least_squares + total.unchecked)};
   summary.turned_deg = mean(total.turned_deg, total.robust);
   summary.unexplained = total.unexplained;
   summary.unchecked = total.unchecked;
@@ -175,8 +178,11 @@ Status SolveLadderInto(const LightStack& stack, const Rig& rig, const std::optio
   }
   field.summary = {};
   const bool known = options.noise.has_value();
-  const Climb climb =
-      MakeClimb(stack, rig, options, *rows, NoiseScaleSquared(stack, mask, *rows, known));
+  const NoiseScale scale = FindNoiseScale(stack, mask, *rows, known);
+  Climb climb = MakeClimb(stack, rig, options, *rows, noise, scale.scale_squared);
+  if (options.mode == LadderMode::kAuto) {
+    climb.sheen = FindSheen(stack, rig, options.least_squares, noise, scale.sample, climb.limit);
+  }
   PieceSummary total;
   if (Status status = ClimbAllRows(climb, task, field, total); !status) {
     return status;
@@ -186,6 +192,10 @@ Status SolveLadderInto(const LightStack& stack, const Rig& rig, const std::optio
   FinishSummary(options.least_squares, task, summary);
   summary.noise_scale = std::isfinite(climb.scale_squared) ? std::sqrt(climb.scale_squared) : 0.0;
   summary.noise_known = known;
+  if (climb.sheen) {
+    summary.sheen_alpha = climb.sheen->alpha;
+    summary.sheen_strength = climb.sheen->strength;
+  }
   summary.seconds = SecondsSince(start);
   Report(total, summary);
   return {};

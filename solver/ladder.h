@@ -40,20 +40,21 @@ struct LadderOptions {
 ///
 ///     var_kc = f_kc (shot_c b_c max(N^0 . l_k, 0.02 |N^0|) + f_kc read_c^2)                   (1)
 ///     b_c = max(0, N_c^0 . N^0 / |N^0|^2)                                                    (2)
-///     N = argmin sum_kc (i'_kc - b_c N . l_k)^2 / var_kc over usable samples k               (3)
-///     uncertainty = sqrt(tr C - n.C n) / |N|,  C = (sum_k W_k l_k l_k^T)^-1,
-///     W_k = sum_c b_c^2 / var_kc,  times s of the whole image                                (4)
-///     misfit = sum_k W_k (m_k - N . l_k)^2 / (usable - 3),  m_k the mean of i'_kc / b_c        (5)
+///     m_k = sum_c u_c i'_kc,  u_c = (b_c / v_c) / sum_c (b_c^2 / v_c), v_c = (1) of the first
+///     light on a pixel that faces it, at least a millionth of the three                      (3)
+///     N = argmin sum_k W_k (m_k - N . l_k)^2 over usable samples k,  W_k = 1 / sum_c u_c^2 var_kc,
+///     uncertainty = s sqrt(tr C - n.C n) / |N|,  C = (sum_k W_k l_k l_k^T)^-1                (4)
+///     misfit = sum_k W_k (m_k - N . l_k)^2 / (usable - 3)                                    (5)
 ///
 /// Variances come from what least squares predict, not from the samples: weights taken from noisy
 /// samples would draw N towards the dark. `uncertainty` is the root mean square angle, in degrees,
 /// between n and the truth; 95 of 100 angles are below 1.96 times that (1.73 where it is the same in
-/// all directions). s^2 is the 25th percentile (5th where the noise is unknown) of the misfits over
-/// that of chi^2: at most 1 where the noise is known, because demosaicing only takes noise away; at
-/// most what neighbouring pixels differ by where it is not, because a shiny scene misfits everywhere.
-/// Never below what rounding of the samples leaves, which in smooth frames may be all there is.
-/// Where the noise is unknown and no pixel has more than three samples, s^2 is what neighbours differ
-/// by; where they tell nothing either, uncertainty = 180: unknown.
+/// all directions). s^2 is the 25th percentile (5th where the noise is unknown) of the misfits of some
+/// 4,000 pixels over that of chi^2: at most 1 where the noise is known, because demosaicing only takes
+/// noise away; at most what neighbouring pixels differ by where it is not, because a shiny scene
+/// misfits everywhere. Never below what rounding of the samples leaves, which in smooth frames may be
+/// all there is. Where the noise is unknown and no pixel has more than three samples, s^2 is what
+/// neighbours differ by; where they tell nothing either, uncertainty = 180: unknown.
 ///
 /// Rung 2, consensus, where misfit / s^2 is above the (1 - false_alarms) quantile of chi^2 and the
 /// residual above explained_residual |N|. With the sum a_c of i'_kc over the usable samples and its
@@ -66,23 +67,36 @@ struct LadderOptions {
 ///     N_abc . l_k = j_k for k = a, b, c:  every triple of the band (of 10 evenly spaced ranks)  (8)
 ///     N = the N_abc of least prod_k (1 + |j_k - N_abc . l_k| / (0.03 q))                       (9)
 ///     twice: N = argmin sum_k w_k (j_k - N . l_k)^2, w_k = (1 + (r_k / (0.1 q))^2)^-2          (10)
-///     uncertainty = hypot(3 degrees, 4 sqrt((tr C - n.C n) S) / |N|),
+///     spread = hypot(3 degrees, 4 sqrt((tr C - n.C n) S) / |N|),
 ///     C = (sum_k w_k l_k l_k^T)^-1, S = sum_k w_k r_k^2 / max(1, sum_k w_k - 3)               (11)
+///     uncertainty = (2 - agreeing / usable) hypot(spread, 0.4 t), t = angle to rung 1's n      (12)
 ///
 /// (6): the highlights of white lights on what is not metal are white, and a coloured cloth's
 /// departure from grey has no part in them.
 /// (9) is the sum of logarithms: it prefers a normal that many samples agree with exactly, whatever
 /// the others do, which is what highlights and shadows need. A pixel in which fewer than four
 /// samples agree with N to 0.1 q is kUnexplained; one with three usable samples, which nothing can
-/// check, is kUnchecked.
+/// check, is kUnchecked. Where from 2 to 20 of 100 pixels take this rung, rung 1's uncertainty gets 0 to
+/// all of hypot(3 degrees, 0.4 t), t in the mean of those pixels; kUnchecked all of t.
+///
+/// Rung 3, a sheen that the scene has in common, where the rig has a camera, at kAuto:
+///
+///     i'_k = N . l_k + s_k(n),  s_k = a pi f(n, l_k, v) max(0, n . l_k), f = Cloth of
+///     reflectance/specular.h with F0 = 0.04, roughness alpha, v towards the camera           (13)
+///     N <- argmin sum_k (i'_k - s_k(n) - N . l_k)^2 / var i'_k, until it moves no more         (14)
+///     a, alpha = argmin sum over some 100 pixels of min(misfit / limit, 4)                   (15)
+///
+/// It is looked for where rung 1 explains fewer than 80 of 100 pixels, and believed where (14)
+/// explains 90; then every pixel that it explains takes it, with uncertainty (4) and half a degree.
 ///
 /// stack, rig, mask, errors   as SolveLambertian
-/// Cost     rung 1 about twice SolveLambertian; rung 2 O(K^2 + K 10^3) a pixel; no
-///          allocation a pixel; the same bits for any number of threads
+/// Cost     rung 1 about 1.6 times SolveLambertian; rung 2 O(K^2 + K 10^3) a pixel; rung 3 some
+///          microseconds a pixel and 0.1 s to find; the same bits for any number of threads
 /// Source   the search over triples is exhaustive RANSAC (Fischler and Bolles 1981) with the cost of
 ///          sparse regression (log-sum: Candes, Wakin and Boyd 2008); the band is position
 ///          thresholding (Shi et al. 2014, section 3);
-///          (6) is the specular-free subspace of Mallick, Zickler, Kriegman and Belhumeur 2005
+///          (6) is the specular-free subspace of Mallick, Zickler, Kriegman and Belhumeur 2005;
+///          (13): Neubelt and Pettineo 2013, equation 23
 [[nodiscard]] Result<NormalField> SolveLadder(const LightStack& stack, const Rig& rig,
                                               const std::optional<Mask>& mask,
                                               const LadderOptions& options = {},

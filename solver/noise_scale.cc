@@ -182,11 +182,7 @@ Neighbours LookAtNeighbours(const LightStack& stack, const MisfitSample& sample)
           .floor = std::max(of_float, kRoundingOfStep * least)};
 }
 
-}  // namespace
-
-double NoiseScaleSquared(const LightStack& stack, const std::optional<Mask>& mask,
-                         const LeastSquaresRows& rows, bool known) {
-  const MisfitSample sample = SampleMisfits(stack, mask, rows);
+double ScaleSquaredOf(const LightStack& stack, const MisfitSample& sample, bool known) {
   const int usual = UsualSamples(sample);
   double scale = kNotKnown;
   if (usual > 0) {
@@ -205,6 +201,16 @@ double NoiseScaleSquared(const LightStack& stack, const std::optional<Mask>& mas
   const Neighbours neighbours = LookAtNeighbours(stack, sample);
   scale = std::max(std::min(scale, neighbours.scale_squared), neighbours.floor);
   return scale > 0.0 ? scale : kNotKnown;
+}
+
+}  // namespace
+
+NoiseScale FindNoiseScale(const LightStack& stack, const std::optional<Mask>& mask,
+                          const LeastSquaresRows& rows, bool known) {
+  NoiseScale scale;
+  scale.sample = SampleMisfits(stack, mask, rows);
+  scale.scale_squared = ScaleSquaredOf(stack, scale.sample, known);
+  return scale;
 }
 
 }  // namespace sateen

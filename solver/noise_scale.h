@@ -8,10 +8,15 @@
 
 namespace sateen {
 
-// s^2 of solver/ladder.h, from some thousand pixels inside the mask, at equal distances in their own
+struct NoiseScale {
+  double scale_squared = 1.0;  // s^2 of solver/ladder.h; infinite where nothing tells of the noise
+  MisfitSample sample;         // what it was read from
+};
+
+// From some thousand pixels inside the mask, at equal distances in their own
 // order: what is looked at depends neither on the threads nor on how much of the image the mask
-// leaves out. Infinite where nothing tells of the noise.
-[[nodiscard]] double NoiseScaleSquared(const LightStack& stack, const std::optional<Mask>& mask,
-                                       const LeastSquaresRows& rows, bool known);
+// leaves out.
+[[nodiscard]] NoiseScale FindNoiseScale(const LightStack& stack, const std::optional<Mask>& mask,
+                                        const LeastSquaresRows& rows, bool known);
 
 }  // namespace sateen

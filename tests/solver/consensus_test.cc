@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
+#include <algorithm>
 #include <cmath>
 #include <random>
 
@@ -183,6 +184,58 @@ TEST(Consensus, WhatFloatRefusesIsSolvedInDouble) {
   const NormalField fast =
       MustSolve(rendered.stack, rig, Forced(LadderMode::kAuto, Backend::kFast));
   EXPECT_EQ(fast.summary.solved, 0);
+}
+
+// Share of the pixels whose 95 % interval holds the truth.
+double ShareInside(const NormalField& field, const RenderedRelief& truth) {
+  Image<float> error;
+  EXPECT_TRUE(AngularErrorDeg(field, truth.normal, &error));
+  size_t inside = 0;
+  for (size_t p = 0; p < error.pixels.size(); ++p) {
+    inside += error.pixels[p] <= 1.96F * field.uncertainty.pixels[p] ? 1 : 0;
+  }
+  return static_cast<double>(inside) / static_cast<double>(error.pixels.size());
+}
+
+TEST(Consensus, IsNotSureOfItselfWhereTheWrongSamplesAgree) {
+  // Six lights of ten see a flat surface, as light from the neighbourhood may show it: they agree with
+  // each other, and the consensus is wrong by up to 20 degrees without any spread.
+  const Rig rig = TwoRings();
+  RenderedRelief rendered = Render(rig, {60, 40}, 20.0);
+  const RenderedRelief flat = Render(rig, {60, 40}, 20.0, ReliefShape::kFlat);
+  for (const size_t k : {0U, 2U, 3U, 5U, 6U, 8U}) {
+    for (size_t c = 0; c < 3; ++c) {
+      for (size_t p = 0; p < 2400; ++p) {
+        rendered.stack[k].rgb[c].pixels[p] = flat.stack[k].rgb[c].pixels[p] *
+                                             rendered.albedo[c].pixels[p] /
+                                             flat.albedo[c].pixels[p];
+      }
+    }
+  }
+  const NormalField field = MustSolve(rendered.stack, rig, Forced(LadderMode::kConsensus));
+  EXPECT_GT(ErrorOf(field, rendered).mean, 6.0);
+  EXPECT_GE(ShareInside(field, rendered), 0.9);
+}
+
+TEST(Consensus, RungOneIsDoubtedAsMuchAsPixelsClimb) {
+  // Of 100 rows so many are spoiled; in the others least squares are exact.
+  const Rig rig = TwoRings();
+  const auto doubt = [&](int spoiled_rows) {
+    RenderedRelief rendered = Render(rig, {40, 100}, 15.0);
+    RenderedRelief spoiled = rendered;
+    Spoil(spoiled.stack, 3, 5);
+    for (size_t k = 0; k < rig.lights.size(); ++k) {
+      for (size_t c = 0; c < 3; ++c) {
+        std::copy_n(spoiled.stack[k].rgb[c].pixels.begin(), 40 * spoiled_rows,
+                    rendered.stack[k].rgb[c].pixels.begin());
+      }
+    }
+    return MustSolve(rendered.stack, rig).uncertainty.At(20, 95);
+  };
+  EXPECT_LT(doubt(1), 0.01F);
+  EXPECT_GT(doubt(11), 1.5F);
+  EXPECT_LT(doubt(11), 0.7F * doubt(30));
+  EXPECT_GT(doubt(30), 3.0F);
 }
 
 }  // namespace
