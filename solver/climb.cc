@@ -20,7 +20,6 @@ namespace {
 
 constexpr size_t kSumBlock = 512;
 constexpr size_t kBlock = 64;  // pixels that are looked at together
-constexpr float kUnexplainedFactor = 3.0F;
 
 bool NeedsConsensus(const Climb& climb, const NormalField& field, float misfit, size_t pixel) {
   if (field.samples.pixels[pixel] <= 3) {
@@ -40,11 +39,6 @@ bool NeedsConsensus(const Climb& climb, const NormalField& field, float misfit, 
                        kLuminance[2] * field.albedo[2].pixels[pixel];
   return field.residual.pixels[pixel] >
          static_cast<float>(climb.options.explained_residual) * albedo;
-}
-
-Eigen::Vector3f NormalAt(const NormalField& field, size_t pixel) {
-  return {field.normal[0].pixels[pixel], field.normal[1].pixels[pixel],
-          field.normal[2].pixels[pixel]};
 }
 
 // As FastRows::SolveConsensus, in double.
@@ -139,11 +133,7 @@ void FindClimbers(const Climb& climb, std::span<const float> misfits, size_t fir
 // Rung 2 for the pixels of one piece.
 void ClimbPixels(const Climb& climb, int begin, const FastRows::Geometry& geometry,
                  std::span<const size_t> pixels, NormalField& field, PieceSummary& summary) {
-  std::vector<Eigen::Vector3f> before;
-  before.reserve(pixels.size());
-  for (const size_t pixel : pixels) {
-    before.push_back(NormalAt(field, pixel));
-  }
+  const std::vector<Eigen::Vector3f> before = NormalsAt(field, pixels);
   std::vector<uint8_t> agreeing(pixels.size());
   if (const FastRows* fast = climb.rows.Fast(); fast != nullptr) {
     fast->SolveConsensus(begin, geometry, pixels, field, agreeing);
@@ -153,29 +143,7 @@ void ClimbPixels(const Climb& climb, int begin, const FastRows::Geometry& geomet
   } else {
     SolveConsensusInDouble(climb, pixels, field, agreeing);
   }
-  for (size_t j = 0; j < pixels.size(); ++j) {
-    const bool explained = agreeing[j] >= kFewestAgreeing;
-    const Eigen::Vector3f after = NormalAt(field, pixels[j]);
-    const double turned_deg = std::atan2(static_cast<double>(before[j].cross(after).norm()),
-                                         static_cast<double>(before[j].dot(after))) *
-                              kDegPerRad;
-    const double rejected = 1.0 - static_cast<double>(agreeing[j]) /
-                                      static_cast<double>(field.samples.pixels[pixels[j]]);
-    float& uncertainty = field.uncertainty.pixels[pixels[j]];
-    uncertainty = static_cast<float>(
-        std::min(180.0, (1.0 + std::max(0.0, rejected)) *
-                            std::hypot(static_cast<double>(uncertainty),
-                                       static_cast<double>(kUncertaintyOfTurn) * turned_deg)));
-    if (!explained) {
-      uncertainty = std::min(180.0F, uncertainty * kUnexplainedFactor);
-      ++summary.unexplained;
-    }
-    field.model.pixels[pixels[j]] =
-        static_cast<uint8_t>(explained ? Rung::kConsensus : Rung::kUnexplained);
-    summary.turned_deg += turned_deg;
-    summary.robust_deg += static_cast<double>(uncertainty);
-  }
-  summary.robust += static_cast<int64_t>(pixels.size());
+  JudgeConsensus(pixels, before, agreeing, field, summary);
 }
 
 // Rung 3 for those of `count` pixels that the scene's sheen explains, also where rung 1 does so by chance.
@@ -194,7 +162,7 @@ void SolveUnderSheen(const Climb& climb, size_t first, size_t count, NormalField
     const std::optional<Eigen::Vector3d> v = ViewOf(climb.rig, column, row);
     system.Gather(column, row);
     const SheenAnswer answer =
-        v ? SolveSheen(system, climb.noise, *climb.sheen, *v) : SheenAnswer{};
+        v ? SolveSheen(SheenSamplesOf(system, climb.noise, *v), *climb.sheen) : SheenAnswer{};
     if (answer.n.isZero() ||
         !(answer.misfit <= static_cast<double>(climb.limit[field.samples.pixels[pixel]]))) {
       continue;
@@ -224,29 +192,14 @@ double SecondsOf(const std::function<void()>& work) {
 
 Climb MakeClimb(const LightStack& stack, const Rig& rig, const LadderOptions& options,
                 const LeastSquaresRows& rows, const StackNoise& noise, double scale_squared) {
-  Climb climb{stack, rig, options, rows, noise, scale_squared};
-  climb.limit.fill(std::numeric_limits<float>::infinity());
-  for (size_t usable = 4; usable < climb.limit.size(); ++usable) {
-    climb.limit[usable] =
-        static_cast<float>(scale_squared * ChiSquaredQuantile(1.0 - options.false_alarms,
-                                                              static_cast<int>(usable) - 3));
-  }
-  return climb;
-}
-
-void PieceSummary::Add(const PieceSummary& other) {
-  AddCounts(other.counts, counts);
-  least_squares += other.least_squares;
-  robust += other.robust;
-  sheen += other.sheen;
-  unexplained += other.unexplained;
-  unchecked += other.unchecked;
-  least_squares_deg += other.least_squares_deg;
-  robust_deg += other.robust_deg;
-  sheen_deg += other.sheen_deg;
-  turned_deg += other.turned_deg;
-  climbing_seconds += other.climbing_seconds;
-  sheen_seconds += other.sheen_seconds;
+  return {stack,
+          rig,
+          options,
+          rows,
+          noise,
+          scale_squared,
+          MisfitLimits(scale_squared, options.false_alarms),
+          std::nullopt};
 }
 
 PieceSummary SolveAndClimb(const Climb& climb, int begin, int end, NormalField& field) {

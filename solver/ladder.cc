@@ -24,32 +24,14 @@ constexpr std::array<std::pair<LadderMode, std::string_view>, 3> kModeNames = {{
     {LadderMode::kConsensus, "robust"},
 }};
 
-// Where many pixels climb, the model is wrong in what noise hides in the others, too: fully from this
-// share on, and not at all where false alarms are as many.
-constexpr double kDoubtfulShare = 0.2;
-constexpr double kUndoubtedShare = 0.02;
-
 double SecondsSince(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-// Share of the model's error that rung 1 gets where so many pixels climbed.
-double DoubtOf(const PieceSummary& total) {
-  const int64_t solved = total.least_squares + total.unchecked + total.robust + total.sheen;
-  const double share =
-      static_cast<double>(total.robust) / static_cast<double>(std::max<int64_t>(solved, 1));
-  return std::clamp((share - kUndoubtedShare) / (kDoubtfulShare - kUndoubtedShare), 0.0, 1.0);
-}
-
-// Adds the model's error to the uncertainty of rung 1, for a scene in which many pixels climbed. What
-// nothing could check is as wrong as those that climbed were.
-Status DoubtLeastSquares(double doubt, const Task& task, NormalField& field, PieceSummary& total) {
+// Adds the model's error to the uncertainty of rung 1.
+Status DoubtLeastSquares(const Doubt& doubt, const Task& task, NormalField& field,
+                         PieceSummary& total) {
   const ImageSize size = field.reason.Size();
-  const auto turned = static_cast<float>(total.turned_deg /
-                                         static_cast<double>(std::max<int64_t>(total.robust, 1)));
-  const auto share = static_cast<float>(doubt);
-  const float model = share * std::hypot(kLeastModelUncertaintyDeg, kUncertaintyOfTurn * turned);
-  const float unchecked = share * std::hypot(kLeastModelUncertaintyDeg, turned);
   std::vector<double> sums(static_cast<size_t>(size.height), 0.0);
   Status status = ParallelFor(
       size.height, RowsPerPiece(size), {.threads = task.threads, .cancel = task.cancel},
@@ -58,8 +40,7 @@ Status DoubtLeastSquares(double doubt, const Task& task, NormalField& field, Pie
           const auto rung = static_cast<Rung>(field.model.pixels[p]);
           if (rung == Rung::kLeastSquares || rung == Rung::kUnchecked) {
             float& uncertainty = field.uncertainty.pixels[p];
-            const float more = rung == Rung::kUnchecked ? unchecked : model;
-            uncertainty = std::min(180.0F, std::hypot(uncertainty, more));
+            uncertainty = doubt.Of(uncertainty, rung);
             sums[static_cast<size_t>(begin)] += static_cast<double>(uncertainty);
           }
         }
@@ -88,23 +69,6 @@ Status CheckNoise(const std::optional<StackNoise>& noise, const LightStack& stac
   return {};
 }
 
-void Report(const PieceSummary& total, SolveSummary& summary) {
-  const auto mean = [](double sum, int64_t count) {
-    return count > 0 ? sum / static_cast<double>(count) : 0.0;
-  };
-  summary.robust = {total.robust, total.climbing_seconds / std::max(1, summary.threads),
-                    mean(total.robust_deg, total.robust)};
-  summary.sheen = {total.sheen, total.sheen_seconds / std::max(1, summary.threads),
-                   mean(total.sheen_deg, total.sheen)};
-  summary.least_squares = {
-      total.least_squares + total.unchecked,
-      std::max(0.0, summary.seconds - summary.robust.seconds - summary.sheen.seconds),
-      mean(total.least_squares_deg, total.least_squares + total.unchecked)};
-  summary.turned_deg = mean(total.turned_deg, total.robust);
-  summary.unexplained = total.unexplained;
-  summary.unchecked = total.unchecked;
-}
-
 Status CheckOptions(const LightStack& stack, const LadderOptions& options) {
   if (Status status = options.Validate(); !status) {
     return status;
@@ -127,7 +91,7 @@ Status ClimbAllRows(const Climb& climb, const Task& task, NormalField& field, Pi
   for (const PieceSummary& piece : pieces) {
     total.Add(piece);
   }
-  if (const double doubt = DoubtOf(total); status && doubt > 0.0) {
+  if (const Doubt doubt = DoubtOf(total); status && !doubt.IsNone()) {
     status = DoubtLeastSquares(doubt, task, field, total);
   }
   return status;
@@ -197,7 +161,7 @@ Status SolveLadderInto(const LightStack& stack, const Rig& rig, const std::optio
     summary.sheen_strength = climb.sheen->strength;
   }
   summary.seconds = SecondsSince(start);
-  Report(total, summary);
+  ReportRungs(total, summary);
   return {};
 }
 

@@ -1,19 +1,21 @@
 #include "solver/mosaic.h"
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <cmath>
+#include <functional>
 #include <future>
-#include <limits>
-#include <mutex>
 #include <utility>
+#include <vector>
 
-#include "core/angle.h"
 #include "core/parallel.h"
 #include "solver/consensus.h"
 #include "solver/fast_rows.h"
 #include "solver/mosaic_feed.h"
 #include "solver/mosaic_site.h"
+#include "solver/rungs.h"
+#include "solver/sheen.h"
 
 namespace sateen {
 namespace {
@@ -23,9 +25,12 @@ using Clock = std::chrono::steady_clock;
 constexpr size_t kMinLights = 3;
 // Rows that are solved first of all, to see whether the model holds: they lie evenly over the image.
 constexpr int kProbes = 32;
-// As in the ladder of solver/ladder.h.
-constexpr float kUnexplainedFactor = 3.0F;
-constexpr double kDoubtfulShare = 0.2;
+
+double SecondsOf(const std::function<void()>& work) {
+  const Clock::time_point start = Clock::now();
+  work();
+  return std::chrono::duration<double>(Clock::now() - start).count();
+}
 
 double SecondsFrom(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
@@ -47,15 +52,9 @@ struct MosaicJob {
   const Mask* mask;  // null: all
   const MosaicOptions& options;
   const MosaicFeed& feed;
-  std::array<float, 256> limit = {};  // of the misfit, by usable readings
-  bool doubt = false;                 // the model is wrong for many sites
-};
-
-struct RowTotals {
-  SolveSummary counts;
-  double least_squares_deg = 0.0;  // sums
-  double robust_deg = 0.0;
-  double turned_deg = 0.0;
+  const std::array<float, 256>& limit;  // of the misfit, by usable readings
+  Doubt doubt;
+  std::optional<Sheen> sheen;
 };
 
 Status CheckMosaics(const MosaicStack& stack, const Rig& rig, const std::optional<Mask>& mask,
@@ -151,64 +150,80 @@ bool MustClimb(const MosaicJob& job, SiteRows& rows, size_t p) {
              static_cast<float>(job.options.explained_residual) * rows.OwnColour(p);
 }
 
-Eigen::Vector3f SiteNormal(const NormalField& field, size_t p) {
-  return {field.normal[0].pixels[p], field.normal[1].pixels[p], field.normal[2].pixels[p]};
-}
-
-void ClimbSites(const MosaicJob& job, const MosaicPiece& piece, std::span<const size_t> sites,
-                SiteRows& rows, RowTotals& totals) {
-  std::vector<Eigen::Vector3f> before;
-  before.reserve(sites.size());
-  for (const size_t p : sites) {
-    before.push_back(SiteNormal(rows.Field(), p));
-  }
-  std::vector<uint8_t> agreeing(sites.size());
-  job.feed.SolveConsensus(piece, sites, rows, agreeing);
-  for (size_t j = 0; j < sites.size(); ++j) {
-    const bool is_explained = agreeing[j] >= kFewestAgreeing;
-    float& uncertainty = rows.Field().uncertainty.pixels[sites[j]];
-    if (!is_explained) {
-      uncertainty = std::min(180.0F, uncertainty * kUnexplainedFactor);
-      ++totals.counts.unexplained;
+// Rung 3: for those sites that the scene's sheen explains.
+void SolveSitesUnderSheen(const MosaicJob& job, const MosaicPiece& piece, SiteRows& rows,
+                          PieceSummary& summary) {
+  MosaicSite site(job.stack, job.rig, job.options.least_squares, true);
+  NormalField& field = rows.Field();
+  for (int row = piece.Begin(); row < piece.End(); ++row) {
+    for (int column = 0; column < job.stack.size_px.width; ++column) {
+      const size_t p = rows.Index(row) + static_cast<size_t>(column);
+      const std::optional<Eigen::Vector3d> v =
+          IsSolved(field, p) ? ViewOf(job.rig, column, row) : std::nullopt;
+      if (!v) {
+        continue;
+      }
+      const SheenAnswer answer =
+          SolveSheen(site.SheenSamplesAt(column, row, piece, *v), *job.sheen);
+      if (answer.n.isZero() ||
+          !(answer.misfit <= static_cast<double>(job.limit[field.samples.pixels[p]]))) {
+        continue;
+      }
+      const Eigen::Vector3d n = answer.n.normalized();
+      for (size_t c = 0; c < 3; ++c) {
+        field.normal[c].pixels[p] = static_cast<float>(n[static_cast<Eigen::Index>(c)]);
+      }
+      rows.OwnColour(p) = static_cast<float>(answer.albedo[0]);
+      field.residual.pixels[p] = static_cast<float>(answer.residual);
+      field.uncertainty.pixels[p] = static_cast<float>(
+          std::min(180.0, std::hypot(answer.uncertainty_deg, kSheenUncertaintyDeg)));
+      field.model.pixels[p] = static_cast<uint8_t>(Rung::kSheen);
+      summary.sheen_deg += static_cast<double>(field.uncertainty.pixels[p]);
+      ++summary.sheen;
     }
-    rows.Field().model.pixels[sites[j]] =
-        static_cast<uint8_t>(is_explained ? Rung::kConsensus : Rung::kUnexplained);
-    const Eigen::Vector3f after = SiteNormal(rows.Field(), sites[j]);
-    totals.turned_deg += std::atan2(static_cast<double>(before[j].cross(after).norm()),
-                                    static_cast<double>(before[j].dot(after))) *
-                         kDegPerRad;
-    totals.robust_deg += static_cast<double>(uncertainty);
   }
-  totals.counts.robust.pixels += static_cast<int64_t>(sites.size());
 }
 
-// Rung 1's word on the piece's sites, then rung 2's on those that climb.
-void Climb(const MosaicJob& job, const MosaicPiece& piece, SiteRows& rows, RowTotals& totals) {
+// Rung 1's word on the piece's sites, rung 3's where the scene has a sheen, then rung 2's on those that
+// climb.
+void Climb(const MosaicJob& job, const MosaicPiece& piece, SiteRows& rows, PieceSummary& summary) {
   NormalField& field = rows.Field();
   std::vector<size_t> sites;
+  const size_t begin = rows.Index(piece.Begin());
   const size_t end = rows.Index(piece.End());
-  for (size_t p = rows.Index(piece.Begin()); p < end; ++p) {
+  std::fill(field.model.pixels.begin() + static_cast<std::ptrdiff_t>(begin),
+            field.model.pixels.begin() + static_cast<std::ptrdiff_t>(end),
+            static_cast<uint8_t>(Rung::kNone));
+  if (job.sheen) {
+    summary.sheen_seconds += SecondsOf([&] { SolveSitesUnderSheen(job, piece, rows, summary); });
+  }
+  for (size_t p = begin; p < end; ++p) {
     if (!IsSolved(field, p)) {
-      field.model.pixels[p] = static_cast<uint8_t>(Rung::kNone);
       field.uncertainty.pixels[p] = 0.0F;
       continue;
     }
-    const bool is_unchecked = field.samples.pixels[p] <= 3;
-    field.model.pixels[p] =
-        static_cast<uint8_t>(is_unchecked ? Rung::kUnchecked : Rung::kLeastSquares);
+    if (field.model.pixels[p] == static_cast<uint8_t>(Rung::kSheen)) {
+      continue;
+    }
+    const Rung rung = field.samples.pixels[p] <= 3 ? Rung::kUnchecked : Rung::kLeastSquares;
+    field.model.pixels[p] = static_cast<uint8_t>(rung);
     if (MustClimb(job, rows, p)) {
       sites.push_back(p);
       continue;
     }
     float& uncertainty = field.uncertainty.pixels[p];
-    uncertainty = std::min(
-        180.0F, job.doubt ? std::hypot(uncertainty, kLeastModelUncertaintyDeg) : uncertainty);
-    totals.least_squares_deg += static_cast<double>(uncertainty);
-    ++totals.counts.least_squares.pixels;
-    totals.counts.unchecked += is_unchecked ? 1 : 0;
+    uncertainty =
+        job.doubt.IsNone() ? std::min(180.0F, uncertainty) : job.doubt.Of(uncertainty, rung);
+    summary.least_squares_deg += static_cast<double>(uncertainty);
+    ++(rung == Rung::kUnchecked ? summary.unchecked : summary.least_squares);
   }
   if (!sites.empty()) {
-    ClimbSites(job, piece, sites, rows, totals);
+    summary.climbing_seconds += SecondsOf([&] {
+      const std::vector<Eigen::Vector3f> before = NormalsAt(field, sites);
+      std::vector<uint8_t> agreeing(sites.size());
+      job.feed.SolveConsensus(piece, sites, rows, agreeing);
+      JudgeConsensus(sites, before, agreeing, field, summary);
+    });
   }
 }
 
@@ -227,7 +242,7 @@ void CountSites(const MosaicPiece& piece, const SiteRows& rows, SolveSummary& co
 }
 
 // False where the rows cannot be read.
-bool SolvePiece(const MosaicJob& job, int begin, int end, SiteRows& rows, RowTotals& totals) {
+bool SolvePiece(const MosaicJob& job, int begin, int end, SiteRows& rows, PieceSummary& summary) {
   const MosaicPiece piece = job.feed.Read(begin, end);
   if (!piece.IsRead()) {
     return false;
@@ -237,31 +252,13 @@ bool SolvePiece(const MosaicJob& job, int begin, int end, SiteRows& rows, RowTot
   job.feed.Solve(piece, job.mask, rows);
   if (backend != Backend::kFast) {
     const int64_t solved = SolveInDouble(job, piece, in_double, rows);
-    totals.counts.resolved_by_reference += in_double ? 0 : solved;
+    summary.counts.resolved_by_reference += in_double ? 0 : solved;
   }
   if (job.options.mode) {
-    Climb(job, piece, rows, totals);
+    Climb(job, piece, rows, summary);
   }
-  CountSites(piece, rows, totals.counts);
+  CountSites(piece, rows, summary.counts);
   return true;
-}
-
-void AddTotals(const RowTotals& piece, RowTotals& total) {
-  SolveSummary& sum = total.counts;
-  const SolveSummary& of = piece.counts;
-  sum.solved += of.solved;
-  sum.dark += of.dark;
-  sum.too_few_samples += of.too_few_samples;
-  sum.saturated += of.saturated;
-  sum.ill_conditioned += of.ill_conditioned;
-  sum.resolved_by_reference += of.resolved_by_reference;
-  sum.least_squares.pixels += of.least_squares.pixels;
-  sum.robust.pixels += of.robust.pixels;
-  sum.unexplained += of.unexplained;
-  sum.unchecked += of.unchecked;
-  total.least_squares_deg += piece.least_squares_deg;
-  total.robust_deg += piece.robust_deg;
-  total.turned_deg += piece.turned_deg;
 }
 
 Status CannotRead(const MosaicStack& stack) {
@@ -270,78 +267,120 @@ Status CannotRead(const MosaicStack& stack) {
 
 // Rows [begin, end) on all threads, their sums in order.
 Status SolveRowsOfMosaic(const MosaicJob& job, int begin, int end, const Task& task, SiteRows& rows,
-                         RowTotals& total) {
+                         PieceSummary& total) {
   const int grain = RowsPerPiece(job.stack.size_px);
-  std::vector<RowTotals> pieces(static_cast<size_t>(end - begin));
+  std::vector<PieceSummary> pieces(static_cast<size_t>(end - begin));
   std::atomic<bool> is_read = true;
   Status status = ParallelFor(end - begin, grain, task, [&](int from, int to) {
     if (!SolvePiece(job, begin + from, begin + to, rows, pieces[static_cast<size_t>(from)])) {
       is_read = false;
     }
   });
-  for (const RowTotals& piece : pieces) {
-    AddTotals(piece, total);
+  for (const PieceSummary& piece : pieces) {
+    total.Add(piece);
   }
   return status && !is_read ? CannotRead(job.stack) : status;
 }
 
 // A row by itself: totals, and the albedo of its sites' own colours. False where it cannot be read.
-bool SolveRowAlone(const MosaicJob& job, int row, RowTotals& totals, std::vector<float>& own) {
+bool SolveRowAlone(const MosaicJob& job, int row, PieceSummary& summary, std::vector<float>& own) {
   NormalField field;
   SiteRows rows;
   ResizeMaps({job.stack.size_px.width, 1}, job.options.mode.has_value(), field);
   rows.Begin(row, row + 1, field, row, job.options.mode.has_value());
-  if (!SolvePiece(job, row, row + 1, rows, totals)) {
+  if (!SolvePiece(job, row, row + 1, rows, summary)) {
     return false;
   }
   own.assign(&rows.OwnColour(0), &rows.OwnColour(0) + job.stack.size_px.width);
   return true;
 }
 
-// Whether so many of some rows climb that rung 1 is to be doubted in what noise hides.
-Result<bool> ShouldDoubt(const MosaicJob& job, const Task& task) {
-  const int height = job.stack.size_px.height;
-  const int probes = std::min(kProbes, height);
-  std::vector<RowTotals> pieces(static_cast<size_t>(probes));
-  std::atomic<bool> is_read = true;
-  const Task silent{.threads = task.threads, .progress = nullptr, .cancel = task.cancel};
-  const Status status = ParallelFor(probes, 1, silent, [&](int probe, int) {
-    const auto row =
-        static_cast<int>((static_cast<int64_t>(probe) * 2 + 1) * height / (2 * probes));
-    std::vector<float> own;
-    if (!SolveRowAlone(job, row, pieces[static_cast<size_t>(probe)], own)) {
-      is_read = false;
-    }
-  });
-  if (!status || !is_read) {
-    return tl::unexpected(status ? CannotRead(job.stack).error() : status.error());
-  }
-  RowTotals total;
-  for (const RowTotals& piece : pieces) {
-    AddTotals(piece, total);
-  }
-  return static_cast<double>(total.counts.robust.pixels) >
-         kDoubtfulShare * static_cast<double>(total.counts.solved);
-}
+// What some rows tell before the others are solved: whether the scene has a sheen, and how far rung 1 is
+// to be doubted in what noise hides.
+class Probe {
+ public:
+  explicit Probe(MosaicJob& job) : job_(job), rows_(std::min(kProbes, job.stack.size_px.height)) {}
 
-SolveSummary SummaryOf(const RowTotals& total, const MosaicOptions& options, const Task& task,
+  Status Run(const Task& task) {
+    const Task silent{.threads = task.threads, .progress = nullptr, .cancel = task.cancel};
+    Status status = SolveRows(silent);
+    if (status && job_.options.mode == LadderMode::kAuto && !AllDistant(job_.rig.lights) &&
+        static_cast<double>(total_.robust) >
+            (1.0 - kWellExplained) * static_cast<double>(total_.counts.solved)) {
+      job_.sheen = FindSheenOfSites();
+      status = job_.sheen ? SolveRows(silent) : status;
+    }
+    job_.doubt = DoubtOf(total_);
+    return status;
+  }
+
+ private:
+  [[nodiscard]] int RowOf(int probe) const {
+    return static_cast<int>((static_cast<int64_t>(probe) * 2 + 1) * job_.stack.size_px.height /
+                            (2 * rows_));
+  }
+
+  Status SolveRows(const Task& task) {
+    std::vector<PieceSummary> pieces(static_cast<size_t>(rows_));
+    std::atomic<bool> is_read = true;
+    const Status status = ParallelFor(rows_, 1, task, [&](int probe, int) {
+      std::vector<float> own;
+      if (!SolveRowAlone(job_, RowOf(probe), pieces[static_cast<size_t>(probe)], own)) {
+        is_read = false;
+      }
+    });
+    total_ = {};
+    for (const PieceSummary& piece : pieces) {
+      total_.Add(piece);
+    }
+    return status && !is_read ? CannotRead(job_.stack) : status;
+  }
+
+  [[nodiscard]] std::optional<Sheen> FindSheenOfSites() const {
+    MosaicSite site(job_.stack, job_.rig, job_.options.least_squares, true);
+    std::vector<SheenSamples> samples;
+    const int columns = static_cast<int>(kSheenPixels) / rows_ + 1;
+    for (int probe = 0; probe < rows_; ++probe) {
+      const int row = RowOf(probe);
+      const MosaicPiece piece = job_.feed.Read(row, row + 1);
+      for (int j = 0; j < columns && piece.IsRead(); ++j) {
+        // Of both colours of the row, one after the other.
+        const int column = (2 * j + 1) * job_.stack.size_px.width / (2 * columns) / 2 * 2 + j % 2;
+        const bool is_inside = job_.mask == nullptr || job_.mask->At(column, row) != 0;
+        const std::optional<Eigen::Vector3d> v =
+            is_inside ? ViewOf(job_.rig, column, row) : std::nullopt;
+        SheenSamples of_site = v ? site.SheenSamplesAt(column, row, piece, *v) : SheenSamples{};
+        if (of_site.l.rows() >= kFewestForSheen) {
+          of_site.limit = static_cast<double>(job_.limit[static_cast<size_t>(of_site.l.rows())]);
+          samples.push_back(std::move(of_site));
+        }
+      }
+    }
+    return SearchSheen(samples);
+  }
+
+  MosaicJob& job_;
+  int rows_;
+  PieceSummary total_;
+};
+
+SolveSummary SummaryOf(const PieceSummary& total, const MosaicJob& job, const Task& task,
                        double seconds) {
   SolveSummary summary = total.counts;
-  const auto mean = [](double sum, int64_t count) {
-    return count > 0 ? sum / static_cast<double>(count) : 0.0;
-  };
   summary.pixels = summary.solved + summary.dark + summary.too_few_samples + summary.saturated +
                    summary.ill_conditioned;
-  summary.least_squares.mean_uncertainty_deg =
-      mean(total.least_squares_deg, summary.least_squares.pixels);
-  summary.robust.mean_uncertainty_deg = mean(total.robust_deg, summary.robust.pixels);
-  summary.turned_deg = mean(total.turned_deg, summary.robust.pixels);
-  summary.noise_known = options.mode.has_value();
-  summary.noise_scale = options.mode ? 1.0 : 0.0;
   summary.seconds = seconds;
-  summary.least_squares.seconds = options.mode ? seconds : 0.0;
   summary.threads = task.ThreadCount();
-  summary.backend = options.least_squares.backend;
+  if (job.options.mode) {
+    ReportRungs(total, summary);
+    summary.noise_known = true;
+    summary.noise_scale = 1.0;
+  }
+  if (job.sheen) {
+    summary.sheen_alpha = job.sheen->alpha;
+    summary.sheen_strength = job.sheen->strength;
+  }
+  summary.backend = job.options.least_squares.backend;
   if (summary.backend == Backend::kFast || summary.backend == Backend::kAuto) {
     summary.instruction_set = KernelInstructionSet();
   }
@@ -356,7 +395,7 @@ class BandSolver {
   // Rows [begin, end), which follow those of the call before; row 0 of `field` is `field_row`.
   Status Solve(int begin, int end, NormalField& field, int field_row) {
     rows_.Begin(begin, end, field, field_row, job_.options.mode.has_value());
-    RowTotals ignored;
+    PieceSummary ignored;
     below_.clear();
     const Status status = SolveRowsOfMosaic(job_, begin, end, task_, rows_, total_);
     if (status && end < job_.stack.size_px.height && !SolveRowAlone(job_, end, ignored, below_)) {
@@ -364,7 +403,7 @@ class BandSolver {
     }
     return status.and_then([&] { return InterpolateAlbedo(begin, end); });
   }
-  [[nodiscard]] const RowTotals& Total() const { return total_; }
+  [[nodiscard]] const PieceSummary& Total() const { return total_; }
 
  private:
   Status InterpolateAlbedo(int begin, int end) {
@@ -394,7 +433,7 @@ class BandSolver {
   const MosaicJob& job_;
   const Task& task_;
   SiteRows rows_;
-  RowTotals total_;
+  PieceSummary total_;
   // Own colours just beyond the band; empty at the image's border.
   std::vector<float> above_;
   std::vector<float> below_;
@@ -403,38 +442,20 @@ class BandSolver {
 // What every solve begins with.
 struct Prepared {
   MosaicFeed feed;
-  std::array<float, 256> limit = {};
-  bool doubt = false;
+  std::array<float, 256> limit;
 };
 
 Result<Prepared> Prepare(const MosaicStack& stack, const Rig& rig, const std::optional<Mask>& mask,
-                         const MosaicOptions& options, const Task& task) {
+                         const MosaicOptions& options) {
   if (const Status status =
           options.Validate().and_then([&] { return CheckMosaics(stack, rig, mask, options); });
       !status) {
     return tl::unexpected(status.error());
   }
-  Result<MosaicFeed> feed =
-      MosaicFeed::Make(stack, rig, options.least_squares, options.mode.has_value());
-  if (!feed) {
-    return tl::unexpected(feed.error());
-  }
-  Prepared prepared{*std::move(feed)};
-  prepared.limit.fill(std::numeric_limits<float>::infinity());
-  for (size_t usable = 4; usable < prepared.limit.size(); ++usable) {
-    prepared.limit[usable] = static_cast<float>(
-        ChiSquaredQuantile(1.0 - options.false_alarms, static_cast<int>(usable) - 3));
-  }
-  if (options.mode == LadderMode::kAuto) {
-    const Result<bool> doubt = ShouldDoubt(
-        {stack, rig, mask ? &*mask : nullptr, options, prepared.feed, prepared.limit}, task);
-    if (!doubt) {
-      return tl::unexpected(doubt.error());
-    }
-    prepared.doubt = *doubt;
-  }
-  task.BeginStage("solving", stack.size_px.height);
-  return prepared;
+  return MosaicFeed::Make(stack, rig, options.least_squares, options.mode.has_value())
+      .map([&](MosaicFeed feed) {
+        return Prepared{std::move(feed), MisfitLimits(1.0, options.false_alarms)};
+      });
 }
 
 }  // namespace
@@ -454,13 +475,17 @@ Result<SolveSummary> SolveMosaicByBands(const MosaicStack& stack, const Rig& rig
                                         const MosaicOptions& options, const Task& task,
                                         const BandSink& sink) {
   const Clock::time_point start = Clock::now();
-  const Result<Prepared> prepared = Prepare(stack, rig, mask, options, task);
+  const Result<Prepared> prepared = Prepare(stack, rig, mask, options);
   if (!prepared) {
     return tl::unexpected(prepared.error());
   }
-  const MosaicJob job{
-      stack,          rig, mask ? &*mask : nullptr, options, prepared->feed, prepared->limit,
-      prepared->doubt};
+  MosaicJob job{stack, rig, mask ? &*mask : nullptr, options, prepared->feed, prepared->limit,
+                {},    {}};
+  if (const Status probed = options.mode == LadderMode::kAuto ? Probe(job).Run(task) : Status();
+      !probed) {
+    return tl::unexpected(probed.error());
+  }
+  task.BeginStage("solving", stack.size_px.height);
   const int height = stack.size_px.height;
   BandSolver solver(job, task);
   std::array<NormalField, 2> maps;  // one is handed on while the other is solved
@@ -482,19 +507,23 @@ Result<SolveSummary> SolveMosaicByBands(const MosaicStack& stack, const Rig& rig
   if (!status || !last) {
     return tl::unexpected(status ? last.error() : status.error());
   }
-  return SummaryOf(solver.Total(), options, task, SecondsFrom(start));
+  return SummaryOf(solver.Total(), job, task, SecondsFrom(start));
 }
 
 Status SolveMosaicInto(const MosaicStack& stack, const Rig& rig, const std::optional<Mask>& mask,
                        const MosaicOptions& options, const Task& task, NormalField& field) {
   const Clock::time_point start = Clock::now();
-  const Result<Prepared> prepared = Prepare(stack, rig, mask, options, task);
+  const Result<Prepared> prepared = Prepare(stack, rig, mask, options);
   if (!prepared) {
     return tl::unexpected(prepared.error());
   }
-  const MosaicJob job{
-      stack,          rig, mask ? &*mask : nullptr, options, prepared->feed, prepared->limit,
-      prepared->doubt};
+  MosaicJob job{stack, rig, mask ? &*mask : nullptr, options, prepared->feed, prepared->limit,
+                {},    {}};
+  if (const Status probed = options.mode == LadderMode::kAuto ? Probe(job).Run(task) : Status();
+      !probed) {
+    return tl::unexpected(probed.error());
+  }
+  task.BeginStage("solving", stack.size_px.height);
   ResizeMaps(stack.size_px, options.mode.has_value(), field);
   BandSolver solver(job, task);
   Status status;
@@ -502,7 +531,7 @@ Status SolveMosaicInto(const MosaicStack& stack, const Rig& rig, const std::opti
     status =
         solver.Solve(begin, std::min(begin + options.band_rows, stack.size_px.height), field, 0);
   }
-  field.summary = SummaryOf(solver.Total(), options, task, SecondsFrom(start));
+  field.summary = SummaryOf(solver.Total(), job, task, SecondsFrom(start));
   return status;
 }
 

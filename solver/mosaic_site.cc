@@ -133,15 +133,42 @@ SiteSolution MosaicSite::Solve(int column, int row, const std::vector<uint16_t>&
   return solution;
 }
 
+double MosaicSite::WeightOf(Eigen::Index k, size_t site, const Eigen::Vector3d& n) const {
+  const SiteNoise noise = NoiseAt(stack_, frames_[static_cast<size_t>(k)], site);
+  const double predicted = std::max(l_.row(k).dot(n), static_cast<double>(kLeastCosine) * n.norm());
+  return e_[k] * e_[k] / (noise.shot * predicted * e_[k] + noise.read_squared);  // (2)
+}
+
+SheenSamples MosaicSite::SheenSamplesAt(int column, int row, const MosaicPiece& piece,
+                                        const Eigen::Vector3d& v) {
+  std::vector<uint16_t> readings(stack_.lit.size());
+  const size_t at =
+      static_cast<size_t>(row - piece.Begin()) * static_cast<size_t>(stack_.size_px.width) +
+      static_cast<size_t>(column);
+  for (size_t k = 0; k < readings.size(); ++k) {
+    readings[k] = piece.Reading(k, at);
+  }
+  SiteSolution solution;
+  Gather(column, row, readings, piece.Dark(at), solution);
+  if (solution.reason != Reason::kSolved) {
+    return {};
+  }
+  SheenSamples samples{.l = l_.topRows(solution.samples), .v = v};
+  samples.i = i_.head(solution.samples).replicate<1, 4>();
+  const Eigen::Vector3d n =
+      (samples.l.transpose() * samples.l).ldlt().solve(samples.l.transpose() * samples.i.col(3));
+  samples.weights.resize(solution.samples);
+  for (Eigen::Index k = 0; k < solution.samples; ++k) {
+    samples.weights[k] = WeightOf(k, static_cast<size_t>(row % 2 * 2 + column % 2), n);
+  }
+  return samples;
+}
+
 void MosaicSite::Weigh(size_t site, SiteSolution& solution) const {
   const auto l = l_.topRows(solution.samples);
-  const double least = static_cast<double>(kLeastCosine) * solution.n.norm();
   Eigen::VectorXd root_weights(solution.samples);
   for (Eigen::Index k = 0; k < solution.samples; ++k) {
-    const SiteNoise noise = NoiseAt(stack_, frames_[static_cast<size_t>(k)], site);
-    const double predicted = std::max(l.row(k).dot(solution.n), least);
-    root_weights[k] =
-        e_[k] / std::sqrt(noise.shot * predicted * e_[k] + noise.read_squared);  // (2)
+    root_weights[k] = std::sqrt(WeightOf(k, site, solution.n));
   }
   const Eigen::MatrixXd weighted = root_weights.asDiagonal() * l;
   const Eigen::VectorXd rhs = root_weights.cwiseProduct(i_.head(solution.samples));

@@ -6,6 +6,8 @@
 #include "imaging/mosaic_stack.h"
 #include "rig/rig.h"
 #include "solver/lambertian.h"
+#include "solver/mosaic_feed.h"
+#include "solver/sheen.h"
 
 namespace sateen {
 
@@ -30,7 +32,13 @@ class MosaicSite {
   [[nodiscard]] SiteSolution Solve(int column, int row, const std::vector<uint16_t>& readings,
                                    float dark);
 
+  // The usable readings of a site of the piece, for rung 3: of one colour, four times the same.
+  [[nodiscard]] SheenSamples SheenSamplesAt(int column, int row, const MosaicPiece& piece,
+                                            const Eigen::Vector3d& v);
+
  private:
+  // 1 / variance of usable reading k, at what N predicts.
+  [[nodiscard]] double WeightOf(Eigen::Index k, size_t site, const Eigen::Vector3d& n) const;
   void Gather(int column, int row, const std::vector<uint16_t>& readings, float dark,
               SiteSolution& solution);
   void Weigh(size_t site, SiteSolution& solution) const;

@@ -20,15 +20,9 @@ namespace {
 constexpr double kSheenF0 = 0.04;
 constexpr int kSheenSteps = 8;
 constexpr double kSheenConverged = 1e-5;  // of |N|
-// Fewer samples leave too little to tell body from sheen.
-constexpr int kFewestForSheen = 6;
-// Below this share of explained pixels a scene needs more than rung 1; a sheen is believed where it
-// explains at least the other one.
-constexpr double kWellExplained = 0.8;
+// A sheen is believed where it explains this share of the pixels that it is looked for on.
 constexpr double kSheenExplains = 0.9;
-// The search looks at so many pixels, and no misfit counts for more than this many limits: outliers are
-// not the sheen's to explain.
-constexpr size_t kSheenPixels = 96;
+// No misfit counts for more than this many limits: outliers are not the sheen's to explain.
 constexpr double kMostOverLimit = 4.0;
 constexpr std::array kAlphas = {0.3, 0.4, 0.5, 0.6, 0.75, 0.9};
 constexpr std::array kStrengths = {0.35, 0.7, 1.4, 2.8};
@@ -38,13 +32,13 @@ constexpr std::array<std::pair<int, int>, 8> kNeighbours = {
     {{1, 0}, {-1, 0}, {0, 1}, {0, -1}, {1, -1}, {-1, 1}, {1, 1}, {-1, -1}}};
 
 // Equation (13)'s s_k, in units of radiance.
-Eigen::VectorXd SheenOf(const PixelSystem& system, const Sheen& sheen, const Eigen::Vector3d& n,
-                        const Eigen::Vector3d& v) {
+Eigen::VectorXd SheenOf(const SheenSamples& samples, const Sheen& sheen, const Eigen::Vector3d& n) {
   const Cloth cloth({.f0 = Eigen::Vector3d::Constant(kSheenF0), .alpha = sheen.alpha});
-  Eigen::VectorXd s(system.Count());
-  for (Eigen::Index k = 0; k < system.Count(); ++k) {
-    const Eigen::Vector3d l = system.L().row(k).transpose();
-    s[k] = sheen.strength * std::numbers::pi * cloth.Evaluate(n, l, v)[0] * std::max(0.0, n.dot(l));
+  Eigen::VectorXd s(samples.l.rows());
+  for (Eigen::Index k = 0; k < samples.l.rows(); ++k) {
+    const Eigen::Vector3d l = samples.l.row(k).transpose();
+    s[k] = sheen.strength * std::numbers::pi * cloth.Evaluate(n, l, samples.v)[0] *
+           std::max(0.0, n.dot(l));
   }
   return s;
 }
@@ -71,42 +65,18 @@ Eigen::VectorXd LuminanceWeightsOf(const PixelSystem& system, const StackNoise& 
   return weights;
 }
 
-struct SheenPixel {
-  int column = 0;
-  int row = 0;
-  Eigen::Vector3d v;
-  float limit = 0.0F;
-};
-
 // Sum over pixels of the misfits in limits, none more than kMostOverLimit; `explained` counts.
-double ScoreOf(const Sheen& sheen, const StackNoise& noise, PixelSystem& system,
-               const std::vector<SheenPixel>& pixels, size_t& explained) {
+double ScoreOf(const Sheen& sheen, const std::vector<SheenSamples>& pixels, size_t& explained) {
   double score = 0.0;
   explained = 0;
-  for (const SheenPixel& pixel : pixels) {
-    system.Gather(pixel.column, pixel.row);
-    const SheenAnswer answer = SolveSheen(system, noise, sheen, pixel.v);
-    const double misfit = answer.n.isZero() ? std::numeric_limits<double>::infinity()
-                                            : answer.misfit / static_cast<double>(pixel.limit);
+  for (const SheenSamples& pixel : pixels) {
+    const SheenAnswer answer = SolveSheen(pixel, sheen);
+    const double misfit =
+        answer.n.isZero() ? std::numeric_limits<double>::infinity() : answer.misfit / pixel.limit;
     score += std::min(misfit, kMostOverLimit);
     explained += misfit <= 1.0 ? 1 : 0;
   }
   return score;
-}
-
-std::vector<SheenPixel> PickPixels(const Rig& rig, size_t width, const MisfitSample& sample,
-                                   const std::array<float, 256>& limit) {
-  std::vector<SheenPixel> pixels;
-  const size_t step = std::max<size_t>(1, sample.pixels.size() / kSheenPixels);
-  for (size_t j = 0; j < sample.pixels.size(); j += step) {
-    const auto column = static_cast<int>(sample.pixels[j] % width);
-    const auto row = static_cast<int>(sample.pixels[j] / width);
-    const std::optional<Eigen::Vector3d> v = ViewOf(rig, column, row);
-    if (v && sample.samples[j] >= kFewestForSheen) {
-      pixels.push_back({column, row, *v, limit[sample.samples[j]]});
-    }
-  }
-  return pixels;
 }
 
 bool LeastSquaresExplain(const MisfitSample& sample, const std::array<float, 256>& limit) {
@@ -121,21 +91,28 @@ bool LeastSquaresExplain(const MisfitSample& sample, const std::array<float, 256
 
 }  // namespace
 
-SheenAnswer SolveSheen(const PixelSystem& system, const StackNoise& noise, const Sheen& sheen,
-                       const Eigen::Vector3d& v) {
-  if (system.Count() < kFewestForSheen) {
+SheenSamples SheenSamplesOf(const PixelSystem& system, const StackNoise& noise,
+                            const Eigen::Vector3d& v, double limit) {
+  SheenSamples samples{.l = system.L(), .i = system.Rhs(), .v = v, .limit = limit};
+  const Eigen::Matrix<double, 3, 4> n0 =
+      (samples.l.transpose() * samples.l).ldlt().solve(samples.l.transpose() * samples.i);
+  samples.weights = LuminanceWeightsOf(system, noise, n0);
+  return samples;
+}
+
+SheenAnswer SolveSheen(const SheenSamples& samples, const Sheen& sheen) {
+  const Eigen::MatrixX3d& l = samples.l;
+  const Eigen::MatrixX4d& i = samples.i;
+  const Eigen::VectorXd& w = samples.weights;
+  if (l.rows() < kFewestForSheen) {
     return {};
   }
-  const Eigen::MatrixX3d l = system.L();
-  const Eigen::MatrixX4d i = system.Rhs();
-  const Eigen::Matrix<double, 3, 4> n0 = (l.transpose() * l).ldlt().solve(l.transpose() * i);
-  const Eigen::VectorXd w = LuminanceWeightsOf(system, noise, n0);
   const Eigen::Matrix3d covariance = (l.transpose() * w.asDiagonal() * l).inverse();
   const Eigen::Matrix3Xd solve = covariance * l.transpose() * w.asDiagonal();
-  Eigen::Vector3d n = n0.col(3);
+  Eigen::Vector3d n = (l.transpose() * l).ldlt().solve(l.transpose() * i.col(3));
   Eigen::VectorXd s;
   for (int step = 0; step < kSheenSteps; ++step) {  // (14)
-    s = SheenOf(system, sheen, n.normalized(), v);
+    s = SheenOf(samples, sheen, n.normalized());
     const Eigen::Vector3d next = solve * (i.col(3) - s);
     const double moved = (next - n).norm();
     n = next;
@@ -149,14 +126,14 @@ SheenAnswer SolveSheen(const PixelSystem& system, const StackNoise& noise, const
   SheenAnswer answer;
   answer.n = n;
   const Eigen::Vector3d unit = n.normalized();
-  s = SheenOf(system, sheen, unit, v);
+  s = SheenOf(samples, sheen, unit);
   const Eigen::VectorXd r = i.col(3) - s - l * n;
   const Eigen::VectorXd cosines = l * unit;
   for (Eigen::Index c = 0; c < 3; ++c) {
     answer.albedo[c] = std::max(0.0, cosines.dot(i.col(c) - s) / cosines.squaredNorm());
   }
-  answer.residual = r.norm() / std::sqrt(system.Count());
-  answer.misfit = r.dot(w.cwiseProduct(r)) / (system.Count() - 3);
+  answer.residual = r.norm() / std::sqrt(static_cast<double>(l.rows()));
+  answer.misfit = r.dot(w.cwiseProduct(r)) / static_cast<double>(l.rows() - 3);
   const double across = covariance.trace() - unit.dot(covariance * unit);
   answer.uncertainty_deg = std::sqrt(std::max(0.0, across)) / n.norm() * kDegPerRad;
   return answer;
@@ -173,21 +150,13 @@ std::optional<Eigen::Vector3d> ViewOf(const Rig& rig, int column, int row) {
   return (rig.camera->table_from_camera.translation() - *x_mm).normalized();
 }
 
-std::optional<Sheen> FindSheen(const LightStack& stack, const Rig& rig,
-                               const LambertianOptions& options, const StackNoise& noise,
-                               const MisfitSample& sample, const std::array<float, 256>& limit) {
-  if (LeastSquaresExplain(sample, limit)) {
-    return std::nullopt;
-  }
-  const auto width = static_cast<size_t>(stack[0].rgb[0].width);
-  const std::vector<SheenPixel> pixels = PickPixels(rig, width, sample, limit);
-  PixelSystem system(stack, rig, options);
+std::optional<Sheen> SearchSheen(const std::vector<SheenSamples>& pixels) {
   Sheen best;
   size_t explained = 0;
   double least = std::numeric_limits<double>::infinity();
   size_t best_explained = 0;
   const auto attempt = [&](const Sheen& sheen) {
-    const double score = ScoreOf(sheen, noise, system, pixels, explained);
+    const double score = ScoreOf(sheen, pixels, explained);
     if (score < least) {
       least = score;
       best = sheen;
@@ -220,6 +189,29 @@ std::optional<Sheen> FindSheen(const LightStack& stack, const Rig& rig,
   const bool believed = !pixels.empty() && static_cast<double>(best_explained) >=
                                                kSheenExplains * static_cast<double>(pixels.size());
   return believed ? std::optional(best) : std::nullopt;
+}
+
+std::optional<Sheen> FindSheen(const LightStack& stack, const Rig& rig,
+                               const LambertianOptions& options, const StackNoise& noise,
+                               const MisfitSample& sample, const std::array<float, 256>& limit) {
+  if (LeastSquaresExplain(sample, limit)) {
+    return std::nullopt;
+  }
+  const auto width = static_cast<size_t>(stack[0].rgb[0].width);
+  PixelSystem system(stack, rig, options);
+  std::vector<SheenSamples> pixels;
+  const size_t step = std::max<size_t>(1, sample.pixels.size() / kSheenPixels);
+  for (size_t j = 0; j < sample.pixels.size(); j += step) {
+    const auto column = static_cast<int>(sample.pixels[j] % width);
+    const auto row = static_cast<int>(sample.pixels[j] / width);
+    const std::optional<Eigen::Vector3d> v = ViewOf(rig, column, row);
+    if (v && sample.samples[j] >= kFewestForSheen) {
+      system.Gather(column, row);
+      pixels.push_back(
+          SheenSamplesOf(system, noise, *v, static_cast<double>(limit[sample.samples[j]])));
+    }
+  }
+  return SearchSheen(pixels);
 }
 
 }  // namespace sateen

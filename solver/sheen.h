@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <optional>
+#include <vector>
 
 #include "solver/least_squares.h"
 #include "solver/noise.h"
@@ -25,9 +26,31 @@ struct SheenAnswer {
   double misfit = 0.0;                               // chi^2 over its degrees of freedom
 };
 
-// Equations (13) and (14), from the usable samples of `system` and the unit vector v to the camera.
-[[nodiscard]] SheenAnswer SolveSheen(const PixelSystem& system, const StackNoise& noise,
-                                     const Sheen& sheen, const Eigen::Vector3d& v);
+// A pixel's usable samples: n x 3 directions, n x 4 i' of red, green, blue and luminance, 1 / variance of
+// the luminance, and the unit vector to the camera. It is explained where its misfit is at most `limit`.
+struct SheenSamples {
+  Eigen::MatrixX3d l;
+  Eigen::MatrixX4d i;
+  Eigen::VectorXd weights;
+  Eigen::Vector3d v = Eigen::Vector3d::UnitZ();
+  double limit = 0.0;
+};
+
+// Of a pixel of a stack, weighted by (1) of solver/ladder.h.
+[[nodiscard]] SheenSamples SheenSamplesOf(const PixelSystem& system, const StackNoise& noise,
+                                          const Eigen::Vector3d& v, double limit = 0.0);
+
+// Equations (13) and (14).
+[[nodiscard]] SheenAnswer SolveSheen(const SheenSamples& samples, const Sheen& sheen);
+
+// Equation (15) over these pixels; nothing where no sheen explains 90 of 100.
+[[nodiscard]] std::optional<Sheen> SearchSheen(const std::vector<SheenSamples>& pixels);
+
+// Pixels that SearchSheen() is to be given, fewer samples that leave too little to tell body from sheen,
+// and the share of pixels that rung 1 has to explain so that no sheen is looked for.
+inline constexpr size_t kSheenPixels = 96;
+inline constexpr int kFewestForSheen = 6;
+inline constexpr double kWellExplained = 0.8;
 
 // The sheen that explains a sample of pixels of which plain least squares leave many unexplained;
 // nothing where none does, or where there is no camera to say from where the surface is seen. A pixel
