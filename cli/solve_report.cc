@@ -54,10 +54,14 @@ nlohmann::json LadderToJson(const SolveSummary& summary) {
   robust["unexplained"] = summary.unexplained;
   nlohmann::json least_squares = ToJson(summary.least_squares);
   least_squares["unchecked"] = summary.unchecked;
+  nlohmann::json sheen = ToJson(summary.sheen);
+  sheen["alpha"] = summary.sheen_alpha;
+  sheen["strength"] = summary.sheen_strength;
   return {{"noise", summary.noise_known ? "known" : "estimated"},
           {"noise_scale", summary.noise_scale},
           {"least_squares", std::move(least_squares)},
-          {"robust", std::move(robust)}};
+          {"robust", std::move(robust)},
+          {"sheen", std::move(sheen)}};
 }
 
 // What each rung did, a line each.
@@ -78,7 +82,13 @@ std::string LadderWords(const SolveSummary& summary) {
   if (summary.unexplained > 0) {
     text += fmt::format("; {} unexplained (see model.png)", summary.unexplained);
   }
-  return text + '\n';
+  text += '\n';
+  if (summary.sheen_strength > 0.0) {
+    text += rung("sheen", summary.sheen) +
+            fmt::format("; the scene's fuzz has roughness {:.2f}, strength {:.2f}\n",
+                        summary.sheen_alpha, summary.sheen_strength);
+  }
+  return text;
 }
 
 // "auto (AVX3)", or "qr", which is not vectorised by us.

@@ -304,9 +304,9 @@ class Probe {
   Status Run(const Task& task) {
     const Task silent{.threads = task.threads, .progress = nullptr, .cancel = task.cancel};
     Status status = SolveRows(silent);
-    if (status && job_.options.mode == LadderMode::kAuto && !AllDistant(job_.rig.lights) &&
-        static_cast<double>(total_.robust) >
-            (1.0 - kWellExplained) * static_cast<double>(total_.counts.solved)) {
+    // One colour's noise hides more of a sheen than three colours' does, so that already a few sites
+    // that climb are a reason to look.
+    if (status && job_.rig.camera && !DoubtOf(total_).IsNone()) {
       job_.sheen = FindSheenOfSites();
       status = job_.sheen ? SolveRows(silent) : status;
     }

@@ -44,7 +44,10 @@ using BandSink = std::function<Status(int first_row, NormalField& band)>;
 /// c is the site's colour, r_k its reading, N^0 the same without weights. Usable is as in
 /// solver/lambertian.h, with the reading in place of three samples. Uncertainty, misfit and rung 2
 /// are those of solver/ladder.h with one channel; the noise is the sensor's own, s = 1, because no
-/// interpolation has changed it. Sites that rung 2 answers are solved by the same search.
+/// interpolation has changed it. Rung 2 also searches in the colours interpolated from a site's
+/// neighbours, and takes what it finds where samples spread less than half as much and as many agree:
+/// highlights on coloured cloth. A sheen (rung 3) is looked for where more than 2 of 100 sites of some
+/// rows climb.
 ///
 /// stack    K lit mosaics of H x W with the noise of their readings, where a ladder is asked for
 /// rig      K lights in the order of the frames; the camera, where a light is not distant

@@ -22,6 +22,8 @@ constexpr int kSheenSteps = 8;
 constexpr double kSheenConverged = 1e-5;  // of |N|
 // A sheen is believed where it explains this share of the pixels that it is looked for on.
 constexpr double kSheenExplains = 0.9;
+// ... and takes at least a fifth off their misfits: chance takes a twentieth.
+constexpr double kSheenImproves = 0.8;
 // No misfit counts for more than this many limits: outliers are not the sheen's to explain.
 constexpr double kMostOverLimit = 4.0;
 constexpr std::array kAlphas = {0.3, 0.4, 0.5, 0.6, 0.75, 0.9};
@@ -186,8 +188,10 @@ std::optional<Sheen> SearchSheen(const std::vector<SheenSamples>& pixels) {
     alpha_step *= 0.5;
     strength_factor = std::sqrt(strength_factor);
   }
-  const bool believed = !pixels.empty() && static_cast<double>(best_explained) >=
-                                               kSheenExplains * static_cast<double>(pixels.size());
+  const double without = ScoreOf({.alpha = kAlphas.front(), .strength = 0.0}, pixels, explained);
+  const bool believed =
+      !pixels.empty() && least < kSheenImproves * without &&
+      static_cast<double>(best_explained) >= kSheenExplains * static_cast<double>(pixels.size());
   return believed ? std::optional(best) : std::nullopt;
 }
 

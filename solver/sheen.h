@@ -43,7 +43,8 @@ struct SheenSamples {
 // Equations (13) and (14).
 [[nodiscard]] SheenAnswer SolveSheen(const SheenSamples& samples, const Sheen& sheen);
 
-// Equation (15) over these pixels; nothing where no sheen explains 90 of 100.
+// Equation (15) over these pixels; nothing where no sheen explains 90 of 100, or where it is little
+// better than none.
 [[nodiscard]] std::optional<Sheen> SearchSheen(const std::vector<SheenSamples>& pixels);
 
 // Pixels that SearchSheen() is to be given, fewer samples that leave too little to tell body from sheen,
