@@ -179,13 +179,15 @@ void MeasureSpeed(CaptureBench& bench, const fs::path& source, int sessions) {
 // kill -9 at moments spread over a capture, then --resume.
 void MeasureKills(CaptureBench& bench, int kills) {
   const Outcome whole = bench.OnRig("", bench.Capture("whole", "--json"));
+  // From its start on, opening the devices included; at its end it may be done before it is killed.
   const double seconds = json::parse(whole.text, nullptr, false).value("seconds", 0.0) + 0.3;
+  const int moments = kills + kills / 10;
   int killed = 0;
   int completed = 0;
   int same = 0;
   double longest_lit = 0.0;
-  for (int k = 0; k < kills; ++k) {
-    const double at_s = seconds * (k + 0.5) / kills;
+  for (int k = 0; k < moments; ++k) {
+    const double at_s = seconds * (k + 0.5) / moments;
     const Outcome cut = bench.OnRig(
         "",
         fmt::format("sh -c \"timeout -s KILL {:.3f} {} >/dev/null; s=\\$?; sleep 2.5; exit \\$s\"",
@@ -202,9 +204,10 @@ void MeasureKills(CaptureBench& bench, int kills) {
     bench.Remove("cut");
   }
   bench.Remove("whole");
-  Row(fmt::format("kill -9 at {} moments", kills),
+  Row(fmt::format("kill -9 at {} moments", moments),
       fmt::format("{} killed, {} resumed and verified, {} the same", killed, completed, same),
-      "all", killed == kills && completed == kills && same == kills);
+      fmt::format("{} killed, all resume", kills),
+      killed >= kills && completed == moments && same == moments);
   Row("a light after kill -9", fmt::format("on for {:.2f} s at most", longest_lit), "2.1 s",
       longest_lit <= 2.1);
 }

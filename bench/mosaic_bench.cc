@@ -327,7 +327,8 @@ Run MeasureFiles(ImageSize size, const fs::path& folder, int repeats) {
       best = run;
     }
   }
-  Row(fmt::format("ten DNG files of {:.0f} megapixels to maps", 1e-6 * size.PixelCount()),
+  Row(fmt::format("ten DNG files of {:.0f} megapixels to maps",
+                  1e-6 * static_cast<double>(size.PixelCount())),
       fmt::format("{:.2f} s, LibRaw alone {:.2f} s: {:.2f}; {:.0f} MiB", best.seconds, libraw,
                   best.seconds / libraw, best.peak_mib),
       "1.6", best.is_good && best.seconds <= 1.6 * libraw);
@@ -345,7 +346,8 @@ void MeasureLarge(ImageSize size, const Run& small, ImageSize small_size, const 
   const Run run = Solve(session, folder / "maps");
   const double ns = 1e9 * run.seconds / static_cast<double>(size.PixelCount());
   const double small_ns = 1e9 * small.seconds / static_cast<double>(small_size.PixelCount());
-  const std::string what = fmt::format("{:.0f} megapixels", 1e-6 * size.PixelCount());
+  const std::string what =
+      fmt::format("{:.0f} megapixels", 1e-6 * static_cast<double>(size.PixelCount()));
   Row(what + ", peak memory", fmt::format("{:.0f} MiB", run.peak_mib), "1024 MiB",
       run.is_good && run.peak_mib <= 1024.0);
   Row(what + ", time", fmt::format("{:.0f} ns/px, {:.2f} of the small", ns, ns / small_ns), "1.10",

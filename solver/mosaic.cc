@@ -227,13 +227,15 @@ void Climb(const MosaicJob& job, const MosaicPiece& piece, SiteRows& rows, Piece
   }
 }
 
+int64_t CountSitesOf(Reason reason, const MosaicPiece& piece, const SiteRows& rows) {
+  const size_t begin = rows.Index(piece.Begin());
+  return CountOf(
+      static_cast<uint8_t>(reason),
+      std::span(rows.Field().reason.pixels).subspan(begin, rows.Index(piece.End()) - begin));
+}
+
 void CountSites(const MosaicPiece& piece, const SiteRows& rows, SolveSummary& counts) {
-  const size_t end = rows.Index(piece.End());
-  std::array<int64_t, 256> of = {};
-  for (size_t p = rows.Index(piece.Begin()); p < end; ++p) {
-    ++of[rows.Field().reason.pixels[p]];
-  }
-  const auto count = [&](Reason reason) { return of[static_cast<size_t>(reason)]; };
+  const auto count = [&](Reason reason) { return CountSitesOf(reason, piece, rows); };
   counts.solved += count(Reason::kSolved);
   counts.dark += count(Reason::kDark);
   counts.too_few_samples += count(Reason::kTooFewSamples);
@@ -250,7 +252,8 @@ bool SolvePiece(const MosaicJob& job, int begin, int end, SiteRows& rows, PieceS
   const Backend backend = job.options.least_squares.backend;
   const bool in_double = backend != Backend::kFast && backend != Backend::kAuto;
   job.feed.Solve(piece, job.mask, rows);
-  if (backend != Backend::kFast) {
+  if (in_double ||
+      (backend == Backend::kAuto && CountSitesOf(Reason::kIllConditioned, piece, rows) > 0)) {
     const int64_t solved = SolveInDouble(job, piece, in_double, rows);
     summary.counts.resolved_by_reference += in_double ? 0 : solved;
   }

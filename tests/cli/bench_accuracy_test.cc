@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/cli/cli_runner.h"
+#include "tests/imaging/pictures.h"
 #include "tests/testing/files.h"
 
 namespace sateen {

@@ -5,6 +5,7 @@
 
 #include "cli/solve.h"
 #include "tests/cli/cli_runner.h"
+#include "tests/imaging/pictures.h"
 #include "tests/testing/files.h"
 
 namespace sateen {
