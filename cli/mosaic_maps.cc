@@ -11,6 +11,8 @@ namespace sateen::cli {
 namespace {
 
 constexpr int kRowsAtOnce = 256;  // even, so that every band begins with the same colours
+// Of a band: its maps and what is on its way to the files take some 100 bytes a pixel.
+constexpr int kPixelsOfBand = 1 << 20;
 
 Image3 ColoursOf(const MosaicStack& stack, size_t frame, int begin, int end) {
   std::vector<uint16_t> buffer;
@@ -53,12 +55,14 @@ Result<SolveSummary> SolveIntoMaps(const MosaicStack& stack, const Rig& rig,
                                    OutputFolder& folder) {
   std::future<Image3> first_frame =
       std::async(std::launch::async, [&stack] { return ThumbnailOf(stack, 0); });
+  MosaicOptions by_bands = options;
+  by_bands.band_rows = std::clamp(kPixelsOfBand / stack.size_px.width, 16, kRowsAtOnce);
   MapsOptions of_solve = maps;
   of_solve.has_ladder = options.mode.has_value();
   Result<MapsWriter> writer = MapsWriter::Begin(stack.size_px, of_solve, folder);
   Result<SolveSummary> summary =
       writer ? SolveMosaicByBands(
-                   stack, rig, mask, options, task,
+                   stack, rig, mask, by_bands, task,
                    [&](int /*first_row*/, NormalField& band) { return writer->Add(band); })
              : tl::unexpected(writer.error());
   const Image3 shown = first_frame.get();

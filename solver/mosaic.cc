@@ -23,6 +23,8 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr size_t kMinLights = 3;
+// Of a thread at a time: with the row more that is read on either side, few rows would be read twice.
+constexpr int kRowsPerPiece = 8;
 // Rows that are solved first of all, to see whether the model holds: they lie evenly over the image.
 constexpr int kProbes = 32;
 
@@ -271,10 +273,9 @@ Status CannotRead(const MosaicStack& stack) {
 // Rows [begin, end) on all threads, their sums in order.
 Status SolveRowsOfMosaic(const MosaicJob& job, int begin, int end, const Task& task, SiteRows& rows,
                          PieceSummary& total) {
-  const int grain = RowsPerPiece(job.stack.size_px);
   std::vector<PieceSummary> pieces(static_cast<size_t>(end - begin));
   std::atomic<bool> is_read = true;
-  Status status = ParallelFor(end - begin, grain, task, [&](int from, int to) {
+  Status status = ParallelFor(end - begin, kRowsPerPiece, task, [&](int from, int to) {
     if (!SolvePiece(job, begin + from, begin + to, rows, pieces[static_cast<size_t>(from)])) {
       is_read = false;
     }
@@ -420,15 +421,14 @@ class BandSolver {
     };
     NormalField& field = rows_.Field();
     const Task silent{.threads = task_.threads, .progress = nullptr, .cancel = task_.cancel};
-    const Status status =
-        ParallelFor(end - begin, RowsPerPiece(job_.stack.size_px), silent, [&](int from, int to) {
-          for (int row = begin + from; row < begin + to; ++row) {
-            const size_t at = rows_.Index(row);
-            InterpolateAlbedoRow(job_.stack.cfa, row, {own(row - 1), own(row), own(row + 1)}, width,
-                                 {&field.albedo[0].pixels[at], &field.albedo[1].pixels[at],
-                                  &field.albedo[2].pixels[at]});
-          }
-        });
+    const Status status = ParallelFor(end - begin, kRowsPerPiece, silent, [&](int from, int to) {
+      for (int row = begin + from; row < begin + to; ++row) {
+        const size_t at = rows_.Index(row);
+        InterpolateAlbedoRow(job_.stack.cfa, row, {own(row - 1), own(row), own(row + 1)}, width,
+                             {&field.albedo[0].pixels[at], &field.albedo[1].pixels[at],
+                              &field.albedo[2].pixels[at]});
+      }
+    });
     above_.assign(own(end - 1), own(end - 1) + width);
     return status;
   }
