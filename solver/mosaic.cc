@@ -54,6 +54,7 @@ struct MosaicJob {
   const Mask* mask;  // null: all
   const MosaicOptions& options;
   const MosaicFeed& feed;
+  PiecePool& pieces;
   const std::array<float, 256>& limit;  // of the misfit, by usable readings
   Doubt doubt;
   std::optional<Sheen> sheen;
@@ -247,7 +248,8 @@ void CountSites(const MosaicPiece& piece, const SiteRows& rows, SolveSummary& co
 
 // False where the rows cannot be read.
 bool SolvePiece(const MosaicJob& job, int begin, int end, SiteRows& rows, PieceSummary& summary) {
-  const MosaicPiece piece = job.feed.Read(begin, end);
+  MosaicPiece piece = job.pieces.Take();
+  job.feed.Read(begin, end, piece);
   if (!piece.IsRead()) {
     return false;
   }
@@ -263,6 +265,7 @@ bool SolvePiece(const MosaicJob& job, int begin, int end, SiteRows& rows, PieceS
     Climb(job, piece, rows, summary);
   }
   CountSites(piece, rows, summary.counts);
+  job.pieces.Give(std::move(piece));
   return true;
 }
 
@@ -346,7 +349,8 @@ class Probe {
     const int columns = static_cast<int>(kSheenPixels) / rows_ + 1;
     for (int probe = 0; probe < rows_; ++probe) {
       const int row = RowOf(probe);
-      const MosaicPiece piece = job_.feed.Read(row, row + 1);
+      MosaicPiece piece;
+      job_.feed.Read(row, row + 1, piece);
       for (int j = 0; j < columns && piece.IsRead(); ++j) {
         // Of both colours of the row, one after the other.
         const int column = (2 * j + 1) * job_.stack.size_px.width / (2 * columns) / 2 * 2 + j % 2;
@@ -482,8 +486,10 @@ Result<SolveSummary> SolveMosaicByBands(const MosaicStack& stack, const Rig& rig
   if (!prepared) {
     return tl::unexpected(prepared.error());
   }
-  MosaicJob job{stack, rig, mask ? &*mask : nullptr, options, prepared->feed, prepared->limit,
-                {},    {}};
+  PiecePool pieces;
+  MosaicJob job{
+      stack, rig, mask ? &*mask : nullptr, options, prepared->feed, pieces, prepared->limit,
+      {},    {}};
   if (const Status probed = options.mode == LadderMode::kAuto ? Probe(job).Run(task) : Status();
       !probed) {
     return tl::unexpected(probed.error());
@@ -520,8 +526,10 @@ Status SolveMosaicInto(const MosaicStack& stack, const Rig& rig, const std::opti
   if (!prepared) {
     return tl::unexpected(prepared.error());
   }
-  MosaicJob job{stack, rig, mask ? &*mask : nullptr, options, prepared->feed, prepared->limit,
-                {},    {}};
+  PiecePool pieces;
+  MosaicJob job{
+      stack, rig, mask ? &*mask : nullptr, options, prepared->feed, pieces, prepared->limit,
+      {},    {}};
   if (const Status probed = options.mode == LadderMode::kAuto ? Probe(job).Run(task) : Status();
       !probed) {
     return tl::unexpected(probed.error());

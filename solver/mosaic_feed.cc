@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "solver/fast_rows.h"
 #include "solver/mosaic_site.h"
@@ -100,8 +101,23 @@ Result<MosaicFeed> MosaicFeed::Make(const MosaicStack& stack, const Rig& rig,
   return feed;
 }
 
-MosaicPiece MosaicFeed::Read(int begin, int end) const {
-  MosaicPiece piece;
+MosaicPiece PiecePool::Take() {
+  const std::lock_guard lock(mutex_);
+  if (idle_.empty()) {
+    return {};
+  }
+  MosaicPiece piece = std::move(idle_.back());
+  idle_.pop_back();
+  return piece;
+}
+
+void PiecePool::Give(MosaicPiece piece) {
+  const std::lock_guard lock(mutex_);
+  idle_.push_back(std::move(piece));
+}
+
+void MosaicFeed::Read(int begin, int end, MosaicPiece& piece) const {
+  piece.is_read_ = true;
   piece.begin_ = begin;
   piece.end_ = end;
   piece.read_begin_ = std::max(0, begin - 1);
@@ -110,6 +126,7 @@ MosaicPiece MosaicFeed::Read(int begin, int end) const {
       static_cast<size_t>(stack_->size_px.width) * static_cast<size_t>(begin - piece.read_begin_);
   const size_t frames = stack_->lit.size();
   piece.buffers_.resize(frames);
+  piece.readings_.clear();
   for (size_t k = 0; k < frames; ++k) {
     const std::span<const uint16_t> rows =
         stack_->rows->Read(k, piece.read_begin_, piece.read_end_, piece.buffers_[k]);
@@ -118,7 +135,6 @@ MosaicPiece MosaicFeed::Read(int begin, int end) const {
   }
   ReadDark(piece);
   Locate(piece);
-  return piece;
 }
 
 void MosaicFeed::ReadDark(MosaicPiece& piece) const {

@@ -1,6 +1,6 @@
 #pragma once
 
-#include <atomic>
+#include <mutex>
 #include <optional>
 #include <span>
 #include <vector>
@@ -68,6 +68,17 @@ class MosaicPiece {
   std::vector<const float*> gain_places_;
 };
 
+// Pieces that are not in use. Calls may come from any thread.
+class PiecePool {
+ public:
+  [[nodiscard]] MosaicPiece Take();
+  void Give(MosaicPiece piece);
+
+ private:
+  std::mutex mutex_;
+  std::vector<MosaicPiece> idle_;
+};
+
 // Feeds rows of a mosaic stack, which it borrows and which must have been checked, to the kernels.
 class MosaicFeed {
  public:
@@ -75,7 +86,8 @@ class MosaicFeed {
   [[nodiscard]] static Result<MosaicFeed> Make(const MosaicStack& stack, const Rig& rig,
                                                const LambertianOptions& options, bool weighted);
 
-  [[nodiscard]] MosaicPiece Read(int begin, int end) const;
+  // Into a piece whose memory is used again: fresh pages for each took a fifth of a large solve.
+  void Read(int begin, int end, MosaicPiece& piece) const;
   // Into the rows of `rows` that are the piece's; `mask` of the whole image or null.
   void Solve(const MosaicPiece& piece, const Mask* mask, SiteRows& rows) const;
   // Rung 2 for the sites listed by their index in `rows`, as FastRows::SolveConsensus: with the site's
