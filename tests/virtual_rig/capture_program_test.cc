@@ -138,8 +138,7 @@ TEST_F(CaptureProgram, PreviewByADaemonHearsCtrlC) {
   const std::string look = (folder_.Path() / "look.jpg").string();
   WriteText(folder_.Path() / "daemon.sh",
             "export SATEEN_SOCKET=" + (folder_.Path() / "s.sock").string() + "\n" +  //
-                kSateen + " serve & daemon=$!\n" +
-                "unset SATEEN_CAMERA SATEEN_PORT\n" +
+                kSateen + " serve & daemon=$!\n" + "unset SATEEN_CAMERA SATEEN_PORT\n" +
                 "while ! [ -S $SATEEN_SOCKET ]; do sleep 0.05; done\n" +
                 "timeout --preserve-status -s INT 2 " + kSateen + " preview -o " + look +
                 " --light 3 --exposure 4s\n" + "echo preview ended with $?\n" +
