@@ -9,6 +9,7 @@
 #include <exception>
 #include <string>
 #include <system_error>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -133,7 +134,7 @@ Result<BandWriter> BandWriter::Open(const std::filesystem::path& path, ImageSize
   SATEEN_CHECK(size.width > 0 && size.height > 0 && (channels == 1 || channels == 3));
   OIIO::ImageSpec spec(size.width, size.height, static_cast<int>(channels),
                        OIIO::BaseTypeFromC<T>::value);
-  const bool is_exr = path.extension() == ".exr";
+  const bool is_exr = std::is_same_v<T, float>;
   spec.attribute("Compression", is_exr ? "none" : kPngStrategy);
   spec.attribute("png:filter", kPngFilterUp);
   spec.attribute("DateTime", "");  // otherwise EXR gets the time of day, and no two files agree

@@ -13,14 +13,14 @@ namespace sateen {
 /// Writes an image file from the top row down, some rows at a time, so that it never lies in memory
 /// whole. The same bytes for the same image, however it is cut into bands.
 ///
-///     .exr  32-bit float, not compressed: compression takes ten times as long as all the rest of a
+///     EXR   32-bit float, not compressed: compression takes ten times as long as all the rest of a
 ///           solve and saves 4 % of a normal map, whose last bits are noise; channels R, G, B or Y
-///     .png  8 or 16 bits as given, grey or RGB
+///     PNG   8 or 16 bits as given, grey or RGB
 ///
 /// Errors  kIo: cannot be encoded or written; what is there then counts for nothing
 class BandWriter {
  public:
-  // `channels` 1 or 3, of T: float for .exr, uint8_t or uint16_t for .png.
+  // `channels` 1 or 3, of T: float for EXR, uint8_t or uint16_t for PNG.
   template <typename T>
   [[nodiscard]] static Result<BandWriter> Open(const std::filesystem::path& path, ImageSize size,
                                                size_t channels);

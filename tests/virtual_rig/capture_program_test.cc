@@ -92,14 +92,16 @@ TEST_F(CaptureProgram, FindsTheExposureAndTakesEveryFrame) {
   EXPECT_EQ(report["rejected"], 0);
   ExpectAllLightsOff();
   ExpectWhole();
-  // On so few sites a twill is not demosaiced well; the same as the simulator makes a RAW session of it.
+  // Against the same as the simulator makes a RAW session of it. What is left in the median is noise,
+  // of which the exposure that was found may have a little less.
   const ShellResult simulated =
       Shell(kSateen + " simulate " + (scene_->Path() / "scene.json").string() + " -o " +
             (folder_.Path() / "raw").string());
   ASSERT_EQ(simulated.exit_status, 0) << simulated.out;
   const double captured_deg = MedianErrorOf(session_);
   const double simulated_deg = MedianErrorOf(folder_.Path() / "raw");
-  EXPECT_NEAR(captured_deg, simulated_deg, 0.1 * simulated_deg);
+  EXPECT_LT(captured_deg, 1.1 * simulated_deg);
+  EXPECT_GT(captured_deg, 0.75 * simulated_deg);
 }
 
 TEST_F(CaptureProgram, GoesOnAfterItWasKilled) {
