@@ -135,15 +135,16 @@ TEST_F(CaptureProgram, AFaultOfTheCameraCostsAFrameAtMost) {
   ExpectWhole();
 }
 
-// Ctrl-C in the middle of an exposure that a daemon takes; then a dry run beside the daemon, which is idle.
+// Ctrl-C, once, in the middle of an exposure that a daemon takes; then a dry run beside the daemon, which is
+// idle.
 TEST_F(CaptureProgram, PreviewByADaemonHearsCtrlC) {
   const std::string look = (folder_.Path() / "look.jpg").string();
   WriteText(folder_.Path() / "daemon.sh",
             "export SATEEN_SOCKET=" + (folder_.Path() / "s.sock").string() + "\n" +  //
                 kSateen + " serve & daemon=$!\n" + "unset SATEEN_CAMERA SATEEN_PORT\n" +
                 "while ! [ -S $SATEEN_SOCKET ]; do sleep 0.05; done\n" +
-                "timeout --preserve-status -s INT 2 " + kSateen + " preview -o " + look +
-                " --light 3 --exposure 4s\n" + "echo preview ended with $?\n" +
+                "timeout --foreground --preserve-status -s INT 2 " + kSateen + " preview -o " +
+                look + " --light 3 --exposure 4s\n" + "echo preview ended with $?\n" +
                 Capture("--exposure 1/50 --dry-run") + "\n" + "kill $daemon; wait $daemon\n");
   const ShellResult ended = OnRig("", "sh " + (folder_.Path() / "daemon.sh").string());
   EXPECT_THAT(ended.out, HasSubstr("preview ended with 6"));
