@@ -10,9 +10,10 @@ namespace sateen::cli {
 namespace {
 
 constexpr int kPanelColumns = 3;
-constexpr double kPanelWidthPx = 330.0;
+constexpr double kPanelWidthPx = 380.0;
 constexpr double kPanelHeightPx = 250.0;
 constexpr double kTitlePx = 40.0;
+constexpr double kLabelPx = 12.0;  // from label to label
 
 double SolvedPercent(const AccuracyRow& row) {
   return row.pixels > 0 ? 100.0 * static_cast<double>(row.angular_error_deg.count) /
@@ -37,28 +38,56 @@ std::string ColorOf(const std::string& method) {
                                                : "#777777";
 }
 
+// What stands beside a dot.
+struct Label {
+  double dot_x = 0.0;
+  double dot_y = 0.0;
+  double y = 0.0;
+  std::string text;
+};
+
+// Labels one below the other, none on another, as near to their dots as that allows.
+void SpreadLabels(double top, double bottom, std::vector<Label>& labels) {
+  std::ranges::sort(labels, {}, &Label::dot_y);
+  double next = top;
+  for (Label& label : labels) {
+    label.y = std::max(label.dot_y, next);
+    next = label.y + kLabelPx;
+  }
+  double most = bottom;
+  for (auto label = labels.rbegin(); label != labels.rend(); ++label) {
+    label->y = std::min(label->y, most);
+    most = label->y - kLabelPx;
+  }
+}
+
 // One data set: a dot for each method, ours in colour.
 std::string Panel(const AccuracyReport& report, const std::string& data, double left, double top) {
   double worst = 0.0;
   for (const AccuracyRow& row : report.rows) {
     worst = row.data == data ? std::max(worst, row.angular_error_deg.mean) : worst;
   }
-  const PlotAxis x{1.0, 1e6, left + 45.0, left + kPanelWidthPx - 15.0, true};
+  const PlotAxis x{10.0, 1e6, left + 45.0, left + kPanelWidthPx - 30.0, true};
   const PlotAxis y{0.0, 1.1 * std::max(worst, 1e-3), top + kPanelHeightPx - 40.0, top + 25.0,
                    false};
   std::string svg = SvgText(left + 0.5 * kPanelWidthPx, top + 14.0, "middle", data);
   svg += SvgGrid(x, y, "", "");
+  std::vector<Label> labels;
   for (const AccuracyRow& row : report.rows) {
-    if (row.data != data) {
-      continue;
+    if (row.data == data) {
+      svg +=
+          SvgDots(x, y, {{row.ns_per_pixel, row.angular_error_deg.mean}}, ColorOf(row.method), 7.0);
+      labels.push_back({x.At(row.ns_per_pixel), y.At(row.angular_error_deg.mean), 0.0, row.method});
     }
-    const double at_x = x.At(row.ns_per_pixel);
-    const double at_y = y.At(row.angular_error_deg.mean);
-    svg +=
-        SvgDots(x, y, {{row.ns_per_pixel, row.angular_error_deg.mean}}, ColorOf(row.method), 7.0);
-    const bool is_right = at_x > x.begin_px + 0.6 * (x.end_px - x.begin_px);
-    svg += SvgText(is_right ? at_x - 7.0 : at_x + 7.0, at_y + 4.0, is_right ? "end" : "start",
-                   row.method, ColorOf(row.method));
+  }
+  SpreadLabels(y.end_px + 6.0, y.begin_px - 6.0, labels);
+  for (const Label& label : labels) {
+    const bool is_right = label.dot_x > x.begin_px + 0.5 * (x.end_px - x.begin_px);
+    const double at = is_right ? label.dot_x - 12.0 : label.dot_x + 12.0;
+    svg += SvgLine(label.dot_x, label.dot_y, at, label.y,
+                   fmt::format("stroke=\"{}\" stroke-width=\"0.7\"", ColorOf(label.text)));
+    svg += SvgText(is_right ? at - 2.0 : at + 2.0, label.y + 4.0, is_right ? "end" : "start",
+                   label.text, ColorOf(label.text));
   }
   return svg;
 }
