@@ -182,12 +182,6 @@ void SolveUnderSheen(const Climb& climb, size_t first, size_t count, NormalField
   }
 }
 
-double SecondsOf(const std::function<void()>& work) {
-  const auto start = std::chrono::steady_clock::now();
-  work();
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
-
 }  // namespace
 
 Climb MakeClimb(const LightStack& stack, const Rig& rig, const LadderOptions& options,

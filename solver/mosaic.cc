@@ -22,17 +22,11 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr size_t kMinLights = 3;
+constexpr size_t kFewestLights = 3;
 // Of a thread at a time: with the row more that is read on either side, few rows would be read twice.
-constexpr int kRowsPerPiece = 8;
+constexpr int kMosaicRowsPerPiece = 8;
 // Rows that are solved first of all, to see whether the model holds: they lie evenly over the image.
 constexpr int kProbes = 32;
-
-double SecondsOf(const std::function<void()>& work) {
-  const Clock::time_point start = Clock::now();
-  work();
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
 
 double SecondsFrom(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
@@ -67,9 +61,9 @@ Status CheckMosaics(const MosaicStack& stack, const Rig& rig, const std::optiona
     return Fail(ErrorCode::kBadData, "{} frames but {} lights; need one light a frame",
                 stack.lit.size(), rig.lights.size());
   }
-  if (stack.lit.size() < kMinLights) {
+  if (stack.lit.size() < kFewestLights) {
     return Fail(ErrorCode::kDegenerate, "{} lights; need at least {} to solve for a normal",
-                stack.lit.size(), kMinLights);
+                stack.lit.size(), kFewestLights);
   }
   if (size.width < static_cast<int>(kFewestSites) || size.height < 2) {
     return Fail(ErrorCode::kBadData, "the mosaics are {}x{} sites; need at least {}x2", size.width,
@@ -278,7 +272,7 @@ Status SolveRowsOfMosaic(const MosaicJob& job, int begin, int end, const Task& t
                          PieceSummary& total) {
   std::vector<PieceSummary> pieces(static_cast<size_t>(end - begin));
   std::atomic<bool> is_read = true;
-  Status status = ParallelFor(end - begin, kRowsPerPiece, task, [&](int from, int to) {
+  Status status = ParallelFor(end - begin, kMosaicRowsPerPiece, task, [&](int from, int to) {
     if (!SolvePiece(job, begin + from, begin + to, rows, pieces[static_cast<size_t>(from)])) {
       is_read = false;
     }
@@ -324,7 +318,7 @@ class Probe {
  private:
   [[nodiscard]] int RowOf(int probe) const {
     return static_cast<int>((static_cast<int64_t>(probe) * 2 + 1) * job_.stack.size_px.height /
-                            (2 * rows_));
+                            (int64_t{2} * rows_));
   }
 
   Status SolveRows(const Task& task) {
@@ -425,7 +419,7 @@ class BandSolver {
     };
     NormalField& field = rows_.Field();
     const Task silent{.threads = task_.threads, .progress = nullptr, .cancel = task_.cancel};
-    const Status status = ParallelFor(end - begin, kRowsPerPiece, silent, [&](int from, int to) {
+    Status status = ParallelFor(end - begin, kMosaicRowsPerPiece, silent, [&](int from, int to) {
       for (int row = begin + from; row < begin + to; ++row) {
         const size_t at = rows_.Index(row);
         InterpolateAlbedoRow(job_.stack.cfa, row, {own(row - 1), own(row), own(row + 1)}, width,

@@ -200,7 +200,10 @@ double ScaleSquaredOf(const LightStack& stack, const MisfitSample& sample, bool 
   }
   const Neighbours neighbours = LookAtNeighbours(stack, sample);
   scale = std::max(std::min(scale, neighbours.scale_squared), neighbours.floor);
-  return scale > 0.0 ? scale : kNotKnown;
+  if (scale > 0.0) {
+    return scale;
+  }
+  return kNotKnown;
 }
 
 }  // namespace

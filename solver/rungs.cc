@@ -2,6 +2,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <limits>
 
@@ -98,6 +99,12 @@ Doubt DoubtOf(const PieceSummary& total) {
                                          static_cast<double>(std::max<int64_t>(total.robust, 1)));
   return {doubt * std::hypot(kLeastModelUncertaintyDeg, kUncertaintyOfTurn * turned),
           doubt * std::hypot(kLeastModelUncertaintyDeg, turned)};
+}
+
+double SecondsOf(const std::function<void()>& work) {
+  const auto start = std::chrono::steady_clock::now();
+  work();
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
 void ReportRungs(const PieceSummary& total, SolveSummary& summary) {

@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -51,6 +52,8 @@ struct Doubt {
   [[nodiscard]] float Of(float uncertainty_deg, Rung rung) const;
 };
 [[nodiscard]] Doubt DoubtOf(const PieceSummary& total);
+
+[[nodiscard]] double SecondsOf(const std::function<void()>& work);
 
 // From sums to the summary, whose `seconds` and `threads` are there.
 void ReportRungs(const PieceSummary& total, SolveSummary& summary);
