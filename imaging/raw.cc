@@ -174,7 +174,7 @@ Status DecodeUnguarded(const std::filesystem::path& path, const TakeDecoded& tak
     return tl::unexpected(head.error());
   }
   if (IsTiffHead(head->bytes)) {
-    if (const Status whole = CheckTiffIsWhole(path); !whole) {
+    if (Status whole = CheckTiffIsWhole(path); !whole) {
       return whole;
     }
   }
@@ -184,7 +184,7 @@ Status DecodeUnguarded(const std::filesystem::path& path, const TakeDecoded& tak
   if (status == LIBRAW_SUCCESS) {
     status = raw->unpack();
   }
-  if (const Status decoded = CheckDecoded(path, *raw, status); !decoded) {
+  if (Status decoded = CheckDecoded(path, *raw, status); !decoded) {
     return decoded;
   }
   return ReadingsOf(path, *raw).and_then([&](const RawReadings& readings) {
