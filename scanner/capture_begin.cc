@@ -153,7 +153,8 @@ Result<Journal> CaptureSession::CheckResume(const fs::path& dir) {
 }
 
 Result<CaptureSession> CaptureSession::Resume(const fs::path& dir, const CaptureOptions& options) {
-  Status ready = options.Validate().and_then([&] { return CheckResume(dir).map([](Journal) {}); });
+  Status ready =
+      options.Validate().and_then([&] { return CheckResume(dir).map([](const Journal&) {}); });
   Result<JournalWriter> writer = ready ? JournalWriter::Open(dir) : tl::unexpected(ready.error());
   // Again, now that no other program can go on here.
   Result<Journal> journal = writer ? CheckResume(dir) : tl::unexpected(writer.error());

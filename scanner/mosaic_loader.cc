@@ -169,8 +169,7 @@ struct Decoding {
 };
 
 Status CheckLike(const Decoding& decoding, const FrameFile& file, const RawReadings& readings) {
-  if (const Status same = CheckSize(file.path.string(), readings.size_px, decoding.size_px);
-      !same) {
+  if (Status same = CheckSize(file.path.string(), readings.size_px, decoding.size_px); !same) {
     return same;
   }
   return readings.cfa == decoding.cfa
@@ -215,7 +214,7 @@ Status DecodeFrame(size_t k, const fs::path& scratch_dir, Decoding& decoding) {
 Status DecodeAll(const fs::path& scratch_dir, const Task& task, Decoding& decoding) {
   const auto count = static_cast<int>(decoding.files.size());
   task.BeginStage("reading", count);
-  if (const Status first = DecodeFrame(0, scratch_dir, decoding); !first) {
+  if (Status first = DecodeFrame(0, scratch_dir, decoding); !first) {
     return first;
   }
   task.Advance();
