@@ -1,16 +1,14 @@
 #include "cli/bench_accuracy.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
-#include <cstdlib>
 #include <functional>
-#include <limits>
 #include <optional>
 #include <ostream>
 #include <utility>
 
 #include "bench/comparators/comparators.h"
+#include "cli/best_seconds.h"
 #include "cli/scene_file.h"
 #include "cli/simulated_session.h"
 #include "core/angle.h"
@@ -78,19 +76,6 @@ void Expose(Capture& capture) {
   }
 }
 
-Result<double> BestSeconds(int repeats, const std::function<Status()>& run) {
-  double best = std::numeric_limits<double>::infinity();
-  for (int i = 0; i < repeats; ++i) {
-    const auto start = std::chrono::steady_clock::now();
-    if (Status status = run(); !status) {
-      return tl::unexpected(status.error());
-    }
-    best = std::min(
-        best, std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
-  }
-  return best;
-}
-
 class AccuracyBench {
  public:
   AccuracyBench(const BenchAccuracyArgs& args, const Task& task) : args_(args), task_(task) {
@@ -132,14 +117,9 @@ class AccuracyBench {
   }
 
   Status MeasurePublic(const DataSet& set) {
-    fs::path data = args_.data;
-    if (const char* from_environment = std::getenv("SATEEN_DATA");
-        data.empty() && from_environment != nullptr) {
-      data = from_environment;
-    }
     Result<Capture> capture =
-        data.empty() ? Fail(ErrorCode::kIo, "no --data and no SATEEN_DATA")
-                     : ReadCapture(data / set.folder, {.lights = set.lights}, Quiet(0));
+        args_.data.empty() ? Fail(ErrorCode::kIo, "no --data and no SATEEN_DATA")
+                           : ReadCapture(args_.data / set.folder, {.lights = set.lights}, Quiet(0));
     if (!capture || !capture->truth) {
       report_.skipped.push_back(
           fmt::format("{}: {}", set.name, capture ? "it has no truth" : capture.error().message));
@@ -305,9 +285,8 @@ void AddBenchAccuracy(CLI::App& bench, BenchAccuracyArgs& args) {
       "accuracy",
       "Every method on every data set that is there: time, error against truth, and whether the "
       "predicted uncertainty holds; beside plain re-implementations of others' methods");
-  cmd->add_option(
-      "--data", args.data,
-      "Folder with the public data sets bunny and diligent-ball; otherwise $SATEEN_DATA");
+  cmd->add_option("--data", args.data, "Folder with the public data sets bunny and diligent-ball")
+      ->envname("SATEEN_DATA");
   cmd->add_option(
          "--scene", args.scenes,
          "Scene file to render as camera RAW and solve, from colours and from mosaics; may "

@@ -9,9 +9,9 @@
 namespace sateen::cli {
 namespace {
 
-constexpr int kPanelColumns = 3;
-constexpr double kPanelWidthPx = 380.0;
-constexpr double kPanelHeightPx = 250.0;
+constexpr int kPlotColumns = 3;
+constexpr double kPlotWidthPx = 380.0;
+constexpr double kPlotHeightPx = 250.0;
 constexpr double kTitlePx = 40.0;
 constexpr double kLabelPx = 12.0;  // from label to label
 
@@ -67,10 +67,9 @@ std::string Panel(const AccuracyReport& report, const std::string& data, double 
   for (const AccuracyRow& row : report.rows) {
     worst = row.data == data ? std::max(worst, row.angular_error_deg.mean) : worst;
   }
-  const PlotAxis x{10.0, 1e6, left + 45.0, left + kPanelWidthPx - 30.0, true};
-  const PlotAxis y{0.0, 1.1 * std::max(worst, 1e-3), top + kPanelHeightPx - 40.0, top + 25.0,
-                   false};
-  std::string svg = SvgText(left + 0.5 * kPanelWidthPx, top + 14.0, "middle", data);
+  const PlotAxis x{10.0, 1e6, left + 45.0, left + kPlotWidthPx - 30.0, true};
+  const PlotAxis y{0.0, 1.1 * std::max(worst, 1e-3), top + kPlotHeightPx - 40.0, top + 25.0, false};
+  std::string svg = SvgText(left + 0.5 * kPlotWidthPx, top + 14.0, "middle", data);
   svg += SvgGrid(x, y, "", "");
   std::vector<Label> labels;
   for (const AccuracyRow& row : report.rows) {
@@ -208,16 +207,18 @@ std::string MarkdownReport(const AccuracyReport& report, const std::string& plot
 
 std::string SvgPlot(const AccuracyReport& report) {
   const std::vector<std::string> names = DataSetsOf(report);
-  const auto rows = static_cast<int>((names.size() + kPanelColumns - 1) / kPanelColumns);
-  std::string svg = SvgText(0.5 * kPanelColumns * kPanelWidthPx, 22.0, "middle",
+  const auto rows = static_cast<int>((names.size() + kPlotColumns - 1) / kPlotColumns);
+  std::string svg = SvgText(0.5 * kPlotColumns * kPlotWidthPx, 22.0, "middle",
                             "Mean error [degrees] against time [ns/pixel, one thread]: lower left "
                             "is better");
   for (size_t i = 0; i < names.size(); ++i) {
-    svg += Panel(report, names[i], static_cast<double>(i % kPanelColumns) * kPanelWidthPx,
-                 kTitlePx + static_cast<double>(i / kPanelColumns) * kPanelHeightPx);
+    const size_t row = i / kPlotColumns;
+    const size_t column = i % kPlotColumns;
+    svg += Panel(report, names[i], static_cast<double>(column) * kPlotWidthPx,
+                 kTitlePx + static_cast<double>(row) * kPlotHeightPx);
   }
-  return SvgFile(static_cast<int>(kPanelColumns * kPanelWidthPx),
-                 static_cast<int>(kTitlePx + rows * kPanelHeightPx), svg);
+  return SvgFile(static_cast<int>(kPlotColumns * kPlotWidthPx),
+                 static_cast<int>(kTitlePx + rows * kPlotHeightPx), svg);
 }
 
 }  // namespace sateen::cli

@@ -2,13 +2,11 @@
 
 #include <algorithm>
 #include <array>
-#include <chrono>
-#include <functional>
-#include <limits>
 #include <ostream>
 #include <utility>
 
 #include "cli/bench_report.h"
+#include "cli/best_seconds.h"
 #include "core/angle.h"
 #include "core/output_folder.h"
 #include "simulation/relief.h"
@@ -70,20 +68,6 @@ Result<std::vector<BenchCase>> RenderCases(ImageSize size, const Task& task) {
                    [](float value) { return value * kSubnormal; });
   }
   return cases;
-}
-
-// Seconds of the fastest of `repeats` runs.
-Result<double> BestSeconds(int repeats, const std::function<Status()>& run) {
-  double best = std::numeric_limits<double>::infinity();
-  for (int i = 0; i < repeats; ++i) {
-    const auto start = std::chrono::steady_clock::now();
-    if (Status status = run(); !status) {
-      return tl::unexpected(status.error());
-    }
-    best = std::min(
-        best, std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
-  }
-  return best;
 }
 
 class Bench {

@@ -157,7 +157,7 @@ Status WriteOverview(const SessionOverviewArgs& args, const Task& task) {
   const Result<Session> session = ReadSessionRecord(args.session);
   const Result<Rig> rig =
       session ? ReadRig(args.session / session->rig) : tl::unexpected(session.error());
-  const Status ours = session && !args.maps.empty() ? CheckMapsAreOf(*session, args) : Status();
+  Status ours = session && !args.maps.empty() ? CheckMapsAreOf(*session, args) : Status();
   if (!ours) {
     return ours;
   }
