@@ -9,11 +9,11 @@
 namespace sateen::cli {
 namespace {
 
-constexpr int kPlotColumns = 3;
-constexpr double kPlotWidthPx = 380.0;
-constexpr double kPlotHeightPx = 250.0;
-constexpr double kTitlePx = 40.0;
-constexpr double kLabelPx = 12.0;  // from label to label
+constexpr int kAccuracyPanelColumns = 3;
+constexpr double kAccuracyPanelWidthPx = 380.0;
+constexpr double kAccuracyPanelHeightPx = 250.0;
+constexpr double kAccuracyTitlePx = 40.0;
+constexpr double kAccuracyLabelPx = 12.0;  // from label to label
 
 double SolvedPercent(const AccuracyRow& row) {
   return row.pixels > 0 ? 100.0 * static_cast<double>(row.angular_error_deg.count) /
@@ -52,12 +52,12 @@ void SpreadLabels(double top, double bottom, std::vector<Label>& labels) {
   double next = top;
   for (Label& label : labels) {
     label.y = std::max(label.dot_y, next);
-    next = label.y + kLabelPx;
+    next = label.y + kAccuracyLabelPx;
   }
   double most = bottom;
   for (auto label = labels.rbegin(); label != labels.rend(); ++label) {
     label->y = std::min(label->y, most);
-    most = label->y - kLabelPx;
+    most = label->y - kAccuracyLabelPx;
   }
 }
 
@@ -67,9 +67,10 @@ std::string Panel(const AccuracyReport& report, const std::string& data, double 
   for (const AccuracyRow& row : report.rows) {
     worst = row.data == data ? std::max(worst, row.angular_error_deg.mean) : worst;
   }
-  const PlotAxis x{10.0, 1e6, left + 45.0, left + kPlotWidthPx - 30.0, true};
-  const PlotAxis y{0.0, 1.1 * std::max(worst, 1e-3), top + kPlotHeightPx - 40.0, top + 25.0, false};
-  std::string svg = SvgText(left + 0.5 * kPlotWidthPx, top + 14.0, "middle", data);
+  const PlotAxis x{10.0, 1e6, left + 45.0, left + kAccuracyPanelWidthPx - 30.0, true};
+  const PlotAxis y{0.0, 1.1 * std::max(worst, 1e-3), top + kAccuracyPanelHeightPx - 40.0,
+                   top + 25.0, false};
+  std::string svg = SvgText(left + 0.5 * kAccuracyPanelWidthPx, top + 14.0, "middle", data);
   svg += SvgGrid(x, y, "", "");
   std::vector<Label> labels;
   for (const AccuracyRow& row : report.rows) {
@@ -207,18 +208,19 @@ std::string MarkdownReport(const AccuracyReport& report, const std::string& plot
 
 std::string SvgPlot(const AccuracyReport& report) {
   const std::vector<std::string> names = DataSetsOf(report);
-  const auto rows = static_cast<int>((names.size() + kPlotColumns - 1) / kPlotColumns);
-  std::string svg = SvgText(0.5 * kPlotColumns * kPlotWidthPx, 22.0, "middle",
+  const auto rows =
+      static_cast<int>((names.size() + kAccuracyPanelColumns - 1) / kAccuracyPanelColumns);
+  std::string svg = SvgText(0.5 * kAccuracyPanelColumns * kAccuracyPanelWidthPx, 22.0, "middle",
                             "Mean error [degrees] against time [ns/pixel, one thread]: lower left "
                             "is better");
   for (size_t i = 0; i < names.size(); ++i) {
-    const size_t row = i / kPlotColumns;
-    const size_t column = i % kPlotColumns;
-    svg += Panel(report, names[i], static_cast<double>(column) * kPlotWidthPx,
-                 kTitlePx + static_cast<double>(row) * kPlotHeightPx);
+    const size_t row = i / kAccuracyPanelColumns;
+    const size_t column = i % kAccuracyPanelColumns;
+    svg += Panel(report, names[i], static_cast<double>(column) * kAccuracyPanelWidthPx,
+                 kAccuracyTitlePx + static_cast<double>(row) * kAccuracyPanelHeightPx);
   }
-  return SvgFile(static_cast<int>(kPlotColumns * kPlotWidthPx),
-                 static_cast<int>(kTitlePx + rows * kPlotHeightPx), svg);
+  return SvgFile(static_cast<int>(kAccuracyPanelColumns * kAccuracyPanelWidthPx),
+                 static_cast<int>(kAccuracyTitlePx + rows * kAccuracyPanelHeightPx), svg);
 }
 
 }  // namespace sateen::cli
