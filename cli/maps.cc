@@ -131,7 +131,7 @@ Status MapsWriter::Finish(const Image3& first_frame, OutputFolder& folder) {
   const Image<float> quality = small_quality_.Mean(0);
   const float top = TopOf(quality, known);
   const std::string heat =
-      error_ ? HeatCaption("error from truth", top, "deg") : HeatCaption("residual", top, "");
+      error_ ? HeatCaption("error", top, "deg") : HeatCaption("residual", top, "");
   std::vector<Rgb8> panels;
   for (const auto& [panel, caption] :
        {std::pair{ShowLinear(first_frame), std::string("first frame")},

@@ -16,6 +16,7 @@
 #include "imaging/image_io.h"
 #include "imaging/raw.h"
 #include "rig/rig.h"
+#include "scanner/folder_listing.h"
 #include "scanner/session.h"
 
 namespace sateen::cli {
@@ -154,6 +155,10 @@ Result<std::vector<Rgb8>> MapPanels(const fs::path& maps) {
 }
 
 Status WriteOverview(const SessionOverviewArgs& args, const Task& task) {
+  if (LowerCase(args.output.extension().string()) != ".png") {
+    return Fail(ErrorCode::kInvalidArgument, "{}: the contact sheet is a PNG; need a name in .png",
+                args.output.string());
+  }
   const Result<Session> session = ReadSessionRecord(args.session);
   const Result<Rig> rig =
       session ? ReadRig(args.session / session->rig) : tl::unexpected(session.error());

@@ -5,6 +5,9 @@
 namespace sateen::cli {
 namespace {
 
+// Share of pixels on the robust rung from which on something may be wrong with the rig.
+constexpr double kFewExplained = 0.9;
+
 nlohmann::json ToJson(const ErrorStatistics& error) {
   return {{"mean", error.mean},
           {"median", error.median},
@@ -70,7 +73,9 @@ std::string LadderWords(const SolveSummary& summary) {
     return fmt::format("{}: {} pixels in {:.3f} s, mean uncertainty {:.2g} degrees", name,
                        of.pixels, of.seconds, of.mean_uncertainty_deg);
   };
-  std::string text = rung("least squares", summary.least_squares);
+  std::string text = summary.least_squares.pixels > 0
+                         ? rung("least squares", summary.least_squares)
+                         : std::string("least squares: explain no pixel");
   if (summary.unchecked > 0) {
     text += fmt::format("; {} with 3 samples, which nothing checks", summary.unchecked);
   }
@@ -83,6 +88,12 @@ std::string LadderWords(const SolveSummary& summary) {
     text += fmt::format("; {} unexplained (see model.png)", summary.unexplained);
   }
   text += '\n';
+  if (static_cast<double>(summary.robust.pixels) >
+      kFewExplained * static_cast<double>(summary.solved)) {
+    text +=
+        "nearly no pixel is as the lights say: the cloth shines, or the rig's lights are not "
+        "calibrated or not these (sateen calibrate lights, calibrate check)\n";
+  }
   if (summary.sheen_strength > 0.0) {
     text += rung("sheen", summary.sheen) +
             fmt::format("; the scene's fuzz has roughness {:.2f}, strength {:.2f}\n",
@@ -166,6 +177,11 @@ std::string TextReport(const SolveArgs& args, const SolveOutcome& outcome) {
       summary.solved, summary.pixels, size.width, size.height, outcome.capture.rig.lights.size(),
       summary.seconds, summary.threads, summary.threads == 1 ? "" : "s", BackendWords(summary),
       outcome.capture.mosaics ? "the mosaics" : "interpolated colours");
+  // Of photographs nobody expects it.
+  if (!outcome.capture.why_no_mosaics.empty() &&
+      outcome.capture.why_no_mosaics.find("not camera RAW") == std::string::npos) {
+    text += fmt::format("not from the mosaics: {}\n", outcome.capture.why_no_mosaics);
+  }
   if (const std::string words = UnsolvedWords(summary); !words.empty()) {
     text += fmt::format("unsolved: {} (see reason.png)\n", words);
   }

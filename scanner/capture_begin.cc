@@ -1,5 +1,10 @@
 // How a CaptureSession comes to be: begun, or gone on with.
+#include <unistd.h>
+
 #include <algorithm>
+#include <cerrno>
+#include <iterator>
+#include <system_error>
 #include <utility>
 
 #include "core/file_io.h"
@@ -19,10 +24,43 @@ Status MakeFolder(const fs::path& path) {
   std::error_code error;
   fs::create_directories(path, error);
   if (error) {
-    return Fail(ErrorCode::kIo, "{}: cannot create this folder: {}", path.string(),
-                error.message());
+    return Fail(ErrorCode::kIo,
+                "{}: cannot create this folder: {}; get write permission, or choose another folder",
+                path.string(), error.message());
   }
   return {};
+}
+
+// The folder that is there already of those that lead to `dir` can be written to.
+Status CheckPlace(const fs::path& dir) {
+  std::error_code ignored;
+  fs::path place = fs::absolute(dir).lexically_normal();
+  while (!fs::exists(place, ignored) && place.has_relative_path()) {
+    place = place.parent_path();
+  }
+  errno = 0;
+  if (fs::is_directory(place, ignored) && access(place.c_str(), W_OK | X_OK) == 0) {
+    return {};
+  }
+  return Fail(ErrorCode::kIo,
+              "{}: cannot be written to: {}; get write permission, or choose another folder",
+              place.string(), std::generic_category().message(errno != 0 ? errno : ENOTDIR));
+}
+
+std::size_t FilesIn(const fs::path& dir) {
+  std::error_code ignored;
+  return static_cast<std::size_t>(
+      std::distance(fs::directory_iterator(dir, ignored), fs::directory_iterator()));
+}
+
+// Frames of which no journal tells: of a session that has lost it, or somebody's.
+Status CheckNoStrangers(const fs::path& dir) {
+  const std::size_t files = Exists(dir / kJournalFile) ? 0 : FilesIn(dir / "frames");
+  return files == 0 ? Status()
+                    : Fail(ErrorCode::kInvalidArgument,
+                           "{}: holds {} files, and no {} tells of them; restore it, or choose "
+                           "another folder",
+                           (dir / "frames").string(), files, kJournalFile);
 }
 
 // Each light has a channel of its own, or two frames would be of one light.
@@ -82,6 +120,9 @@ Result<Rig> CaptureSession::CheckBegin(const fs::path& dir, const fs::path& rig_
              "--resume {}",
              dir.string(), dir.string());
   }
+  status = status.and_then([&] { return CheckNoStrangers(dir); }).and_then([&] {
+    return CheckPlace(dir);
+  });
   return status ? std::move(rig) : tl::unexpected(status.error());
 }
 

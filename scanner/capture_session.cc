@@ -122,7 +122,10 @@ Status CaptureSession::VerifyDone() {
     }
     if (const Result<std::string> hash = CheckedHash(FileOf(*journal_.done[frame])); !hash) {
       if (journal_.complete) {
-        return tl::unexpected(hash.error());
+        return Fail(hash.error().code,
+                    "{}\n{}: is a complete session, of which no frame is taken again; restore the "
+                    "file, or capture anew into another folder",
+                    hash.error().message, dir_.string());
       }
       if (Status rejected = Reject(frame, hash.error().message); !rejected) {
         return rejected;

@@ -412,6 +412,26 @@ TEST_F(CaptureTest, DoesNotTouchASessionThatIsThere) {
   EXPECT_TRUE(VerifySession(dir_, {}));
 }
 
+TEST_F(CaptureTest, DoesNotCaptureOverFramesOfWhichNoJournalTells) {
+  fs::create_directories(dir_ / "frames");
+  WriteText(dir_ / "frames" / "01-led-0.dng", "precious");
+  const Error error = ErrorOf(Begin());
+  EXPECT_EQ(error.code, ErrorCode::kInvalidArgument);
+  EXPECT_THAT(error.message, HasSubstr("holds 1 files"));
+  EXPECT_EQ(fs::file_size(dir_ / "frames" / "01-led-0.dng"), 8U);
+  EXPECT_FALSE(fs::exists(dir_ / "journal.jsonl"));
+}
+
+TEST_F(CaptureTest, ACompleteSessionThatLostAFrameSaysWhatToDo) {
+  ASSERT_TRUE(Begin());
+  fs::remove(dir_ / "frames" / "04-led-3.dng");
+  Result<CaptureSession> session = CaptureSession::Resume(dir_, QuickCapture());
+  ASSERT_TRUE(session) << session.error().message;
+  const Error error = ErrorOf(session->Finish());
+  EXPECT_THAT(error.message, HasSubstr("04-led-3.dng"));
+  EXPECT_THAT(error.message, HasSubstr("restore the file, or capture anew"));
+}
+
 TEST_F(CaptureTest, RefusesRigsAndOptionsThatCannotBe) {
   Rig twice = rig_;
   twice.lights[4].channel = 2;
