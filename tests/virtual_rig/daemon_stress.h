@@ -169,12 +169,18 @@ class StressClient {
       case 6:
         return FollowForAWhile();
       default:
-        return Expect("light",
-                      Ask("POST", fmt::format("/v1/lights/{}", Any(16)),
-                          fmt::format(R"({{"level": {}, "for_ms": {}, "client": "c{}"}})",
-                                      Any(11) / 10.0, 1 + Any(900), Any(3))),
-                      {202, 409});
+        return TurnOnALight();
     }
+  }
+
+  // One of the board's 14, or one that it has not.
+  void TurnOnALight() {
+    const int light = Any(16);
+    Expect(light < 14 ? "light" : "light that is not there",
+           Ask("POST", fmt::format("/v1/lights/{}", light),
+               fmt::format(R"({{"level": {}, "for_ms": {}, "client": "c{}"}})", Any(11) / 10.0,
+                           1 + Any(900), Any(3))),
+           {light < 14 ? 202 : 400, 409});
   }
 
   std::string CurrentJob() {
