@@ -32,7 +32,7 @@ std::vector<std::string> DataSetsOf(const AccuracyReport& report) {
   return names;
 }
 
-std::string ColorOf(const std::string& method) {
+std::string ColorOfMethod(const std::string& method) {
   return method.starts_with("ladder")          ? "#c03028"
          : method.starts_with("least squares") ? "#3060b0"
                                                : "#777777";
@@ -75,8 +75,8 @@ std::string Panel(const AccuracyReport& report, const std::string& data, double 
   std::vector<Label> labels;
   for (const AccuracyRow& row : report.rows) {
     if (row.data == data) {
-      svg +=
-          SvgDots(x, y, {{row.ns_per_pixel, row.angular_error_deg.mean}}, ColorOf(row.method), 7.0);
+      svg += SvgDots(x, y, {{row.ns_per_pixel, row.angular_error_deg.mean}},
+                     ColorOfMethod(row.method), 7.0);
       labels.push_back({x.At(row.ns_per_pixel), y.At(row.angular_error_deg.mean), 0.0, row.method});
     }
   }
@@ -85,9 +85,9 @@ std::string Panel(const AccuracyReport& report, const std::string& data, double 
     const bool is_right = label.dot_x > x.begin_px + 0.5 * (x.end_px - x.begin_px);
     const double at = is_right ? label.dot_x - 12.0 : label.dot_x + 12.0;
     svg += SvgLine(label.dot_x, label.dot_y, at, label.y,
-                   fmt::format("stroke=\"{}\" stroke-width=\"0.7\"", ColorOf(label.text)));
+                   fmt::format("stroke=\"{}\" stroke-width=\"0.7\"", ColorOfMethod(label.text)));
     svg += SvgText(is_right ? at - 2.0 : at + 2.0, label.y + 4.0, is_right ? "end" : "start",
-                   label.text, ColorOf(label.text));
+                   label.text, ColorOfMethod(label.text));
   }
   return svg;
 }
