@@ -63,7 +63,7 @@ Result<SolveSummary> SolveIntoMaps(const MosaicStack& stack, const Rig& rig,
   Result<SolveSummary> summary =
       writer ? SolveMosaicByBands(
                    stack, rig, mask, by_bands, task,
-                   [&](int /*first_row*/, NormalField& band) { return writer->Add(band); })
+                   [&](int /*first_row*/, const NormalField& band) { return writer->Add(band); })
              : tl::unexpected(writer.error());
   const Image3 shown = first_frame.get();
   if (!summary) {

@@ -353,7 +353,9 @@ class Probe {
             is_inside ? ViewOf(job_.rig, column, row) : std::nullopt;
         SheenSamples of_site = v ? site.SheenSamplesAt(column, row, piece, *v) : SheenSamples{};
         if (of_site.l.rows() >= kFewestForSheen) {
-          of_site.limit = static_cast<double>(job_.limit[static_cast<size_t>(of_site.l.rows())]);
+          // As the maps count samples: 255 stands for more.
+          of_site.limit = static_cast<double>(
+              job_.limit[static_cast<size_t>(std::min<Eigen::Index>(of_site.l.rows(), 255))]);
           samples.push_back(std::move(of_site));
         }
       }
@@ -440,23 +442,33 @@ class BandSolver {
   std::vector<float> below_;
 };
 
-// What every solve begins with.
-struct Prepared {
-  MosaicFeed feed;
-  std::array<float, 256> limit;
-};
-
-Result<Prepared> Prepare(const MosaicStack& stack, const Rig& rig, const std::optional<Mask>& mask,
-                         const MosaicOptions& options) {
+// What all solves have in common: `solve_bands` hands every band to the solver, in order.
+Result<SolveSummary> SolveBandsBy(const MosaicStack& stack, const Rig& rig,
+                                  const std::optional<Mask>& mask, const MosaicOptions& options,
+                                  const Task& task,
+                                  const std::function<Status(BandSolver&)>& solve_bands) {
+  const Clock::time_point start = Clock::now();
   if (const Status status =
           options.Validate().and_then([&] { return CheckMosaics(stack, rig, mask, options); });
       !status) {
     return tl::unexpected(status.error());
   }
-  return MosaicFeed::Make(stack, rig, options.least_squares, options.mode.has_value())
-      .map([&](MosaicFeed feed) {
-        return Prepared{std::move(feed), MisfitLimits(1.0, options.false_alarms)};
-      });
+  const Result<MosaicFeed> feed =
+      MosaicFeed::Make(stack, rig, options.least_squares, options.mode.has_value());
+  if (!feed) {
+    return tl::unexpected(feed.error());
+  }
+  const std::array<float, 256> limit = MisfitLimits(1.0, options.false_alarms);
+  PiecePool pieces;
+  MosaicJob job{stack, rig, mask ? &*mask : nullptr, options, *feed, pieces, limit, {}, {}};
+  if (const Status probed = options.mode == LadderMode::kAuto ? Probe(job).Run(task) : Status();
+      !probed) {
+    return tl::unexpected(probed.error());
+  }
+  task.BeginStage("solving", stack.size_px.height);
+  BandSolver solver(job, task);
+  return solve_bands(solver).map(
+      [&] { return SummaryOf(solver.Total(), job, task, SecondsFrom(start)); });
 }
 
 }  // namespace
@@ -475,69 +487,42 @@ Result<SolveSummary> SolveMosaicByBands(const MosaicStack& stack, const Rig& rig
                                         const std::optional<Mask>& mask,
                                         const MosaicOptions& options, const Task& task,
                                         const BandSink& sink) {
-  const Clock::time_point start = Clock::now();
-  const Result<Prepared> prepared = Prepare(stack, rig, mask, options);
-  if (!prepared) {
-    return tl::unexpected(prepared.error());
-  }
-  PiecePool pieces;
-  MosaicJob job{
-      stack, rig, mask ? &*mask : nullptr, options, prepared->feed, pieces, prepared->limit,
-      {},    {}};
-  if (const Status probed = options.mode == LadderMode::kAuto ? Probe(job).Run(task) : Status();
-      !probed) {
-    return tl::unexpected(probed.error());
-  }
-  task.BeginStage("solving", stack.size_px.height);
-  const int height = stack.size_px.height;
-  BandSolver solver(job, task);
-  std::array<NormalField, 2> maps;  // one is handed on while the other is solved
-  std::future<Status> handed_on;
-  Status status;
-  for (int begin = 0, k = 0; status && begin < height; begin += options.band_rows, ++k) {
-    NormalField& field = maps[static_cast<size_t>(k % 2)];
-    const int end = std::min(begin + options.band_rows, height);
-    ResizeMaps({stack.size_px.width, end - begin}, options.mode.has_value(), field);
-    status = solver.Solve(begin, end, field, begin);
-    const Status before = handed_on.valid() ? handed_on.get() : Status();
-    status = before ? status : before;
-    if (status) {
-      handed_on =
-          std::async(std::launch::async, [&sink, &field, begin] { return sink(begin, field); });
+  return SolveBandsBy(stack, rig, mask, options, task, [&](BandSolver& solver) {
+    const int height = stack.size_px.height;
+    std::array<NormalField, 2> maps;  // one is handed on while the other is solved
+    std::future<Status> handed_on;
+    Status status;
+    for (int begin = 0, k = 0; status && begin < height; begin += options.band_rows, ++k) {
+      NormalField& field = maps[static_cast<size_t>(k % 2)];
+      const int end = std::min(begin + options.band_rows, height);
+      ResizeMaps({stack.size_px.width, end - begin}, options.mode.has_value(), field);
+      status = solver.Solve(begin, end, field, begin);
+      const Status before = handed_on.valid() ? handed_on.get() : Status();
+      status = before ? status : before;
+      if (status) {
+        handed_on =
+            std::async(std::launch::async, [&sink, &field, begin] { return sink(begin, field); });
+      }
     }
-  }
-  const Status last = handed_on.valid() ? handed_on.get() : Status();
-  if (!status || !last) {
-    return tl::unexpected(status ? last.error() : status.error());
-  }
-  return SummaryOf(solver.Total(), job, task, SecondsFrom(start));
+    const Status last = handed_on.valid() ? handed_on.get() : Status();
+    return status ? last : status;
+  });
 }
 
 Status SolveMosaicInto(const MosaicStack& stack, const Rig& rig, const std::optional<Mask>& mask,
                        const MosaicOptions& options, const Task& task, NormalField& field) {
-  const Clock::time_point start = Clock::now();
-  const Result<Prepared> prepared = Prepare(stack, rig, mask, options);
-  if (!prepared) {
-    return tl::unexpected(prepared.error());
-  }
-  PiecePool pieces;
-  MosaicJob job{
-      stack, rig, mask ? &*mask : nullptr, options, prepared->feed, pieces, prepared->limit,
-      {},    {}};
-  if (const Status probed = options.mode == LadderMode::kAuto ? Probe(job).Run(task) : Status();
-      !probed) {
-    return tl::unexpected(probed.error());
-  }
-  task.BeginStage("solving", stack.size_px.height);
-  ResizeMaps(stack.size_px, options.mode.has_value(), field);
-  BandSolver solver(job, task);
-  Status status;
-  for (int begin = 0; status && begin < stack.size_px.height; begin += options.band_rows) {
-    status =
-        solver.Solve(begin, std::min(begin + options.band_rows, stack.size_px.height), field, 0);
-  }
-  field.summary = SummaryOf(solver.Total(), job, task, SecondsFrom(start));
-  return status;
+  return SolveBandsBy(stack, rig, mask, options, task,
+                      [&](BandSolver& solver) {
+                        const int height = stack.size_px.height;
+                        ResizeMaps(stack.size_px, options.mode.has_value(), field);
+                        Status status;
+                        for (int begin = 0; status && begin < height; begin += options.band_rows) {
+                          const int end = std::min(begin + options.band_rows, height);
+                          status = solver.Solve(begin, end, field, 0);
+                        }
+                        return status;
+                      })
+      .map([&](const SolveSummary& summary) { field.summary = summary; });
 }
 
 Result<NormalField> SolveMosaic(const MosaicStack& stack, const Rig& rig,

@@ -29,8 +29,8 @@ struct MosaicOptions {
 };
 
 // Takes rows [first_row, first_row + band height) of the maps; bands come in order, and one call is
-// over before the next begins. Its content may be moved from.
-using BandSink = std::function<Status(int first_row, NormalField& band)>;
+// over before the next begins. The band's memory is used again.
+using BandSink = std::function<Status(int first_row, const NormalField& band)>;
 
 /// Surface normal, albedo and uncertainty at every site of a mosaic, each from readings of its own
 /// colour: nothing is interpolated before the normals are known, and a third of the numbers is read.
@@ -55,8 +55,8 @@ using BandSink = std::function<Status(int first_row, NormalField& band)>;
 /// Returns  H x W, as SolveLadder; without `mode` as SolveLambertian. `residual` is of the own colour
 /// Errors   as SolveLambertian; kBadData where a ladder has no noise to go by, or the mosaic is
 ///          narrower than 64 sites; kIo where rows cannot be read; what the sink returns
-/// Cost     rung 1: O(H W K), about a third of SolveLambertian's without weights; the same bits for
-///          any number of threads and any band_rows
+/// Cost     O(H W K): nine tenths of what the same solve of interpolated colours takes, and the
+///          interpolating is saved; the same bits for any number of threads and any band_rows
 [[nodiscard]] Result<NormalField> SolveMosaic(const MosaicStack& stack, const Rig& rig,
                                               const std::optional<Mask>& mask,
                                               const MosaicOptions& options = {},

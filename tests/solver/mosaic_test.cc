@@ -292,7 +292,7 @@ TEST(MosaicTest, BandsAndThreadsGiveTheSameBits) {
     joined.Resize(kSize);
     joined.uncertainty = Image<float>(kSize);
     int expected_row = 0;
-    const auto sink = [&](int first_row, NormalField& band) {
+    const auto sink = [&](int first_row, const NormalField& band) {
       EXPECT_EQ(first_row, expected_row);
       expected_row += band.reason.height;
       const auto put = [&](const auto& from, auto& to) {
