@@ -1,0 +1,32 @@
+#pragma once
+
+#include <array>
+#include <optional>
+
+#include "imaging/mosaic_stack.h"
+#include "rig/rig.h"
+#include "solver/mosaic.h"
+#include "solver/mosaic_feed.h"
+#include "solver/rungs.h"
+#include "solver/sheen.h"
+
+namespace sateen {
+
+// One solve of a mosaic stack.
+struct MosaicJob {
+  const MosaicStack& stack;
+  const Rig& rig;
+  const Mask* mask;  // null: all
+  const MosaicOptions& options;
+  const MosaicFeed& feed;
+  PiecePool& pieces;
+  const std::array<float, 256>& limit;  // of the misfit, by usable readings
+  Doubt doubt;
+  std::optional<Sheen> sheen;
+};
+
+// All rungs for rows [begin, end), into `rows`. False where their readings cannot be read.
+[[nodiscard]] bool SolvePiece(const MosaicJob& job, int begin, int end, SiteRows& rows,
+                              PieceSummary& summary);
+
+}  // namespace sateen
