@@ -103,7 +103,8 @@ void SolveSitesUnderSheen(const MosaicJob& job, const MosaicPiece& piece, SiteRo
 
 // Rung 1's word on the piece's sites, rung 3's where the scene has a sheen, then rung 2's on those that
 // climb.
-void Climb(const MosaicJob& job, const MosaicPiece& piece, SiteRows& rows, PieceSummary& summary) {
+void ClimbSites(const MosaicJob& job, const MosaicPiece& piece, SiteRows& rows,
+                PieceSummary& summary) {
   NormalField& field = rows.Field();
   std::vector<size_t> sites;
   const size_t begin = rows.Index(piece.Begin());
@@ -177,7 +178,7 @@ bool SolvePiece(const MosaicJob& job, int begin, int end, SiteRows& rows, PieceS
     summary.counts.resolved_by_reference += in_double ? 0 : solved;
   }
   if (job.options.mode) {
-    Climb(job, piece, rows, summary);
+    ClimbSites(job, piece, rows, summary);
   }
   CountSites(piece, rows, summary.counts);
   job.pieces.Give(std::move(piece));
