@@ -47,8 +47,27 @@ struct UnixClient : httplib::ClientImpl {
   }
 };
 
+// Whether somebody accepts connections there, and lets this user in.
+bool Accepts(const std::filesystem::path& path) {
+  sockaddr_un address = {.sun_family = AF_UNIX};
+  if (path.native().size() >= sizeof address.sun_path) {
+    return false;
+  }
+  std::memcpy(address.sun_path, path.c_str(), path.native().size() + 1);
+  const int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  const bool connected =
+      fd >= 0 &&
+      connect(fd, static_cast<sockaddr*>(static_cast<void*>(&address)), sizeof address) == 0;
+  if (fd >= 0) {
+    close(fd);
+  }
+  return connected;
+}
+
+// A daemon that dies while it is asked breaks off its answer, as one that is slow does: who accepts
+// nobody any more is gone.
 Error NoAnswer(const std::filesystem::path& socket, httplib::Error error) {
-  const bool slow = error == httplib::Error::Read;
+  const bool slow = error == httplib::Error::Read && Accepts(socket);
   return {slow ? ErrorCode::kTimeout : ErrorCode::kDevice,
           fmt::format("the daemon at {} {}: {}; start it again, or end it to work without one",
                       socket.string(), slow ? "does not answer" : "is gone",
@@ -157,23 +176,6 @@ class Follower {
   std::atomic<bool> ended_ = false;
   std::thread thread_;  // last, as it uses the others
 };
-
-// Whether somebody accepts connections there, and lets this user in.
-bool Accepts(const std::filesystem::path& path) {
-  sockaddr_un address = {.sun_family = AF_UNIX};
-  if (path.native().size() >= sizeof address.sun_path) {
-    return false;
-  }
-  std::memcpy(address.sun_path, path.c_str(), path.native().size() + 1);
-  const int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
-  const bool connected =
-      fd >= 0 &&
-      connect(fd, static_cast<sockaddr*>(static_cast<void*>(&address)), sizeof address) == 0;
-  if (fd >= 0) {
-    close(fd);
-  }
-  return connected;
-}
 
 std::filesystem::path Absolute(const std::filesystem::path& path) {
   return path.empty() ? path : std::filesystem::absolute(path).lexically_normal();

@@ -1,9 +1,14 @@
 #include "scanner/daemon/http_client.h"
 
 #include <gmock/gmock.h>
+#include <poll.h>
+#include <sys/socket.h>
+#include <unistd.h>
 
 #include <cstdlib>
 #include <memory>
+#include <optional>
+#include <thread>
 
 #include "scanner/daemon/event_parser.h"
 #include "scanner/daemon/http_server.h"
@@ -151,6 +156,23 @@ TEST_F(DaemonClientTest, ADaemonThatGoesAwayIsToldOf) {
   EXPECT_EQ(gone.error().code, ErrorCode::kDevice);
   EXPECT_THAT(gone.error().message, HasSubstr("is gone"));
   daemon_.service.Stop();
+}
+
+// Killed between the question and its answer.
+TEST_F(DaemonClientTest, ADaemonThatDiesWhileItIsAskedIsGone) {
+  std::optional<Listener> listener(*Listener::OnUnixSocket(Socket()));
+  std::thread daemon([&] {
+    const int connection = accept(listener->Descriptor(), nullptr, nullptr);
+    pollfd asked = {.fd = connection, .events = POLLIN};
+    EXPECT_EQ(poll(&asked, 1, 60'000), 1);
+    listener.reset();
+    close(connection);
+  });
+  const Result<std::string> answer = client_.Ask("GET", "/v1/state");
+  daemon.join();
+  ASSERT_FALSE(answer);
+  EXPECT_EQ(answer.error().code, ErrorCode::kDevice);
+  EXPECT_THAT(answer.error().message, HasSubstr("is gone"));
 }
 
 TEST(EventParser, TakesEventsOutOfAnyPieces) {
