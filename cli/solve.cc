@@ -345,8 +345,7 @@ void AddSolve(CLI::App& root, SolveArgs& args) {
          "--domain", args.domain,
          "What is solved. raw: each site of the mosaic from readings of its own colour; rgb: "
          "colours interpolated at every pixel; auto: raw where all frames are camera RAW, one "
-         "exposure a light, not moved, and, but for --robust none, the rig knows the sensor's "
-         "noise")
+         "exposure a light and not moved")
       ->check(CLI::IsMember({"auto", "raw", "rgb"}))
       ->capture_default_str();
   cmd->add_option("--shadow-level", args.solver.shadow_level,

@@ -109,6 +109,11 @@ std::string BackendWords(const SolveSummary& summary) {
              : fmt::format("{} ({})", Name(summary.backend), summary.instruction_set);
 }
 
+// By which mosaics were weighted; null: nothing was.
+const SensorNoise* NoiseOfMosaics(const Capture& capture) {
+  return capture.mosaics && capture.mosaics->noise ? &*capture.mosaics->noise : nullptr;
+}
+
 }  // namespace
 
 std::string JsonReport(const SolveArgs& args, const SolveOutcome& outcome) {
@@ -144,6 +149,11 @@ std::string JsonReport(const SolveArgs& args, const SolveOutcome& outcome) {
   }
   if (args.robust != "none") {
     report["ladder"] = LadderToJson(summary);
+  }
+  if (const auto* noise = NoiseOfMosaics(outcome.capture)) {
+    report["sensor_noise"] = {{"source", noise->source},
+                              {"gain_dn_per_electron", noise->gain_dn},
+                              {"read_noise_dn", noise->read_dn}};
   }
   if (outcome.angular_error_deg) {
     report["truth"] = outcome.capture.truth->source;
@@ -181,6 +191,15 @@ std::string TextReport(const SolveArgs& args, const SolveOutcome& outcome) {
   if (!outcome.capture.why_no_mosaics.empty() &&
       outcome.capture.why_no_mosaics.find("not camera RAW") == std::string::npos) {
     text += fmt::format("not from the mosaics: {}\n", outcome.capture.why_no_mosaics);
+  }
+  if (const auto* noise = NoiseOfMosaics(outcome.capture)) {
+    text += fmt::format("noise by {}: {:.3g} DN an electron, {:.2g} DN of reading\n", noise->source,
+                        noise->gain_dn, noise->read_dn);
+  }
+  if (outcome.capture.mosaics && args.robust != "none" && !summary.noise_known) {
+    text += fmt::format(
+        "noise by the residuals: {:.2g} DN an electron; sateen calibrate response measures it\n",
+        summary.noise_scale * summary.noise_scale);
   }
   if (const std::string words = UnsolvedWords(summary); !words.empty()) {
     text += fmt::format("unsolved: {} (see reason.png)\n", words);

@@ -28,12 +28,19 @@ struct FrameFile {
 // The lit frames of one light: one, or several of different exposures, the longest first.
 using LightFiles = std::vector<FrameFile>;
 
+// A light's frame, and the same once more at the end of a capture.
+struct RepeatedLight {
+  FrameFile first;
+  FrameFile again;
+};
+
 // What a layout says about a capture, before any pixel is read.
 struct CapturePlan {
   std::string layout;
   Rig rig;
   std::vector<LightFiles> lit;  // [light of the rig]; empty where the session has no frame of it
   std::vector<FrameFile> dark;
+  std::optional<RepeatedLight> repeated;  // with one exposure
   std::optional<std::filesystem::path> mask;
   bool mask_is_shared = false;  // it lies one folder up: left out where its size does not fit
   std::optional<TruthFiles> truth;

@@ -134,7 +134,8 @@ Result<std::unique_ptr<MosaicStore>> OpenStore(const fs::path& scratch_dir, Imag
 }
 
 // (1) and (2) of scanner/sensor_reading.h, for integers.
-Result<MosaicFrame> FrameOf(const FrameFile& file, const RawReadings& readings) {
+Result<MosaicFrame> FrameOf(const FrameFile& file, const RawReadings& readings,
+                            const std::optional<SensorNoise>& noise) {
   RawMosaic levels{.cfa = readings.cfa, .white = readings.white};
   for (const float black : readings.black) {
     levels.black += black / 4.0F;
@@ -149,9 +150,9 @@ Result<MosaicFrame> FrameOf(const FrameFile& file, const RawReadings& readings) 
       frame.saturated_dn =
           std::min(frame.saturated_dn, readings.black[site] + reading.saturation * range);
     }
-    if (file.response && file.response->gain_dn_per_electron && file.response->read_noise_dn) {
-      frame.gain_dn = *file.response->gain_dn_per_electron;
-      frame.read_dn = *file.response->read_noise_dn;
+    if (noise) {
+      frame.gain_dn = noise->gain_dn;
+      frame.read_dn = noise->read_dn;
     }
     return frame;
   });
@@ -160,6 +161,7 @@ Result<MosaicFrame> FrameOf(const FrameFile& file, const RawReadings& readings) 
 // What is known once the first frame is decoded, and one entry for each frame.
 struct Decoding {
   MosaicMemory memory;
+  std::optional<SensorNoise> noise;
   std::vector<FrameFile> files;  // lit, then dark
   std::vector<MosaicFrame> frames;
   std::vector<std::string> hashes;
@@ -197,8 +199,9 @@ Status DecodeFrame(size_t k, const fs::path& scratch_dir, Decoding& decoding) {
       }
       decoding.store = *std::move(store);
     }
-    Result<MosaicFrame> frame =
-        CheckLike(decoding, file, readings).and_then([&] { return FrameOf(file, readings); });
+    Result<MosaicFrame> frame = CheckLike(decoding, file, readings).and_then([&] {
+      return FrameOf(file, readings, decoding.noise);
+    });
     if (!frame) {
       return tl::unexpected(frame.error());
     }
@@ -233,7 +236,7 @@ Status DecodeAll(const fs::path& scratch_dir, const Task& task, Decoding& decodi
 
 }  // namespace
 
-std::optional<std::string> WhyNoMosaics(const CapturePlan& plan, bool by_noise) {
+std::optional<std::string> WhyNoMosaics(const CapturePlan& plan) {
   const auto is_raw = [](const FrameFile& file) { return IsRawName(file.path); };
   for (const LightFiles& files : plan.lit) {
     if (files.size() > 1) {
@@ -249,16 +252,13 @@ std::optional<std::string> WhyNoMosaics(const CapturePlan& plan, bool by_noise) 
   if (!std::ranges::all_of(plan.dark, is_raw)) {
     return "the dark frames are not camera RAW";
   }
-  const std::optional<Response>& response = plan.rig.response;
-  if (by_noise && !(response && response->gain_dn_per_electron && response->read_noise_dn)) {
-    return "the rig does not say the sensor's gain and read noise (sateen calibrate response)";
-  }
   return std::nullopt;
 }
 
-Result<LoadedMosaics> LoadMosaics(const CapturePlan& plan, const fs::path& scratch_dir,
-                                  const Task& task, const MosaicMemory& memory) {
-  Decoding decoding{.memory = memory};
+Result<LoadedMosaics> LoadMosaics(const CapturePlan& plan, const std::optional<SensorNoise>& noise,
+                                  const fs::path& scratch_dir, const Task& task,
+                                  const MosaicMemory& memory) {
+  Decoding decoding{.memory = memory, .noise = noise};
   for (const LightFiles& files : plan.lit) {
     decoding.files.push_back(files.front());
   }
@@ -268,7 +268,7 @@ Result<LoadedMosaics> LoadMosaics(const CapturePlan& plan, const fs::path& scrat
   if (const Status decoded = DecodeAll(scratch_dir, task, decoding); !decoded) {
     return tl::unexpected(decoded.error());
   }
-  LoadedMosaics loaded{.readings = std::move(decoding.store)};
+  LoadedMosaics loaded{.readings = std::move(decoding.store), .noise = noise};
   const auto first_dark = decoding.frames.begin() + static_cast<std::ptrdiff_t>(plan.lit.size());
   loaded.stack = {.size_px = decoding.size_px,
                   .cfa = decoding.cfa,
@@ -284,6 +284,9 @@ Result<LoadedMosaics> LoadMosaics(const CapturePlan& plan, const fs::path& scrat
   }
   for (size_t k = 0; k < decoding.files.size(); ++k) {
     loaded.sha256_of_input[decoding.files[k].path.string()] = decoding.hashes[k];
+  }
+  if (noise) {
+    loaded.sha256_of_input.insert(noise->sha256_of_input.begin(), noise->sha256_of_input.end());
   }
   return loaded;
 }

@@ -5,6 +5,7 @@
 #include <map>
 
 #include "core/sha256.h"
+#include "imaging/raw.h"
 
 namespace sateen {
 namespace {
@@ -93,13 +94,17 @@ Status CheckSettings(const Session& session, const std::string& where) {
   return {};
 }
 
+FrameFile FileOf(const fs::path& dir, const SessionFrame& frame, const CapturePlan& plan) {
+  return {dir / frame.file, frame.Exposure(), frame.sha256, plan.rig.response,
+          frame.shift_px.value_or(Eigen::Vector2d::Zero())};
+}
+
 // Puts each frame at the place of its light.
 Status AssignFrames(const fs::path& dir, CapturePlan& plan) {
   const std::string where = (dir / "session.json").string();
   plan.lit.resize(plan.rig.lights.size());
   for (const SessionFrame& frame : plan.session->frames) {
-    FrameFile file{dir / frame.file, frame.Exposure(), frame.sha256, plan.rig.response,
-                   frame.shift_px.value_or(Eigen::Vector2d::Zero())};
+    FrameFile file = FileOf(dir, frame, plan);
     if (frame.role == FrameRole::kDark) {
       plan.dark.push_back(std::move(file));
       continue;
@@ -119,6 +124,29 @@ Status AssignFrames(const fs::path& dir, CapturePlan& plan) {
     }
   }
   return CheckSettings(*plan.session, where);
+}
+
+// A light's frame and its repeat, which ReadSession() leaves out; nothing where they are not camera RAW
+// of one exposure.
+Result<std::optional<RepeatedLight>> FindRepeat(const fs::path& dir, const CapturePlan& plan) {
+  const Result<Session> record = ReadSessionRecord(dir);
+  if (!record) {
+    return tl::unexpected(record.error());
+  }
+  for (const SessionFrame& frame : record->frames) {
+    if (frame.role != FrameRole::kRepeat || !IsRawName(frame.file)) {
+      continue;
+    }
+    const auto first = std::ranges::find_if(record->frames, [&](const SessionFrame& other) {
+      return other.role == FrameRole::kLit && other.light == frame.light &&
+             other.exposure_s == frame.exposure_s && other.f_number == frame.f_number &&
+             other.iso == frame.iso && IsRawName(other.file);
+    });
+    if (first != record->frames.end()) {
+      return RepeatedLight{.first = FileOf(dir, *first, plan), .again = FileOf(dir, frame, plan)};
+    }
+  }
+  return std::nullopt;
 }
 
 // A calibrated rig differs from the one that the session was captured with by what a ruler is wrong
@@ -197,6 +225,11 @@ Result<CapturePlan> PlanSession(const fs::path& dir, const ReadCaptureOptions& o
   if (const Status status = AssignFrames(dir, *plan); !status) {
     return tl::unexpected(status.error());
   }
+  Result<std::optional<RepeatedLight>> repeated = FindRepeat(dir, *plan);
+  if (!repeated) {
+    return tl::unexpected(repeated.error());
+  }
+  plan->repeated = *std::move(repeated);
   if (options.rig_file) {
     WarnOfOtherRig(dir, *options.rig_file, *plan);
   }

@@ -238,9 +238,14 @@ Status AddCompanions(const CapturePlan& plan, Capture& capture) {
 // As colours or as mosaics.
 Status ReadFrames(const CapturePlan& plan, const ReadCaptureOptions& options, const Task& task,
                   Capture& capture) {
-  const std::optional<std::string> why_not = WhyNoMosaics(plan, options.by_noise);
+  const std::optional<std::string> why_not = WhyNoMosaics(plan);
   if (options.domain != Domain::kRgb && !why_not) {
-    return LoadMosaics(plan, options.scratch_dir, task).map([&](LoadedMosaics mosaics) {
+    const Result<std::optional<SensorNoise>> noise =
+        options.by_noise ? FindSensorNoise(plan) : std::optional<SensorNoise>();
+    if (!noise) {
+      return tl::unexpected(noise.error());
+    }
+    return LoadMosaics(plan, *noise, options.scratch_dir, task).map([&](LoadedMosaics mosaics) {
       capture.sha256_of_input = mosaics.sha256_of_input;
       capture.mosaics = std::move(mosaics);
     });

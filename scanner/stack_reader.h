@@ -59,7 +59,8 @@ struct ReadCaptureOptions {
   bool lights_unknown = false;
   Encoding encoding = Encoding::kAuto;
   Domain domain = Domain::kRgb;
-  bool by_noise = true;                    // WhyNoMosaics()
+  // Whether mosaics are weighed by the sensor's noise, so that FindSensorNoise() is asked.
+  bool by_noise = true;
   std::filesystem::path scratch_dir = {};  // LoadMosaics()
 };
 

@@ -12,6 +12,7 @@
 #include "core/parallel.h"
 #include "solver/fast_rows.h"
 #include "solver/mosaic_feed.h"
+#include "solver/mosaic_noise.h"
 #include "solver/mosaic_rungs.h"
 #include "solver/mosaic_site.h"
 #include "solver/rungs.h"
@@ -25,8 +26,7 @@ using Clock = std::chrono::steady_clock;
 constexpr size_t kFewestLights = 3;
 // Of a thread at a time: with the row more that is read on either side, few rows would be read twice.
 constexpr int kMosaicRowsPerPiece = 8;
-// Rows that are solved first of all, to see whether the model holds: they lie evenly over the image.
-constexpr int kProbes = 32;
+constexpr double kRoundingDn = 0.2887;  // standard deviation of rounding to whole readings
 
 double SecondsFrom(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
@@ -41,8 +41,7 @@ void ResizeMaps(ImageSize size, bool with_ladder, NormalField& field) {
   }
 }
 
-Status CheckMosaics(const MosaicStack& stack, const Rig& rig, const std::optional<Mask>& mask,
-                    const MosaicOptions& options) {
+Status CheckMosaics(const MosaicStack& stack, const Rig& rig, const std::optional<Mask>& mask) {
   const ImageSize size = stack.size_px;
   if (stack.lit.size() != rig.lights.size()) {
     return Fail(ErrorCode::kBadData, "{} frames but {} lights; need one light a frame",
@@ -60,16 +59,6 @@ Status CheckMosaics(const MosaicStack& stack, const Rig& rig, const std::optiona
     return Fail(ErrorCode::kBadData, "the mask is {}x{} px but the frames are {}x{} px",
                 mask->width, mask->height, size.width, size.height);
   }
-  for (const MosaicFrame& frame : stack.lit) {
-    if (options.mode && !(frame.gain_dn > 0.0 || frame.read_dn > 0.0)) {
-      return Fail(
-          ErrorCode::kBadData,
-          "{}: its noise is not known, by which mosaics are weighted; need the sensor's gain "
-          "and read noise in the rig (sateen calibrate response), or solve without weights, "
-          "or from interpolated colours",
-          frame.name);
-    }
-  }
   if (Status status = rig.Validate("rig"); !status || AllDistant(rig.lights)) {
     return status;
   }
@@ -80,8 +69,10 @@ Status CheckMosaics(const MosaicStack& stack, const Rig& rig, const std::optiona
   return {};
 }
 
-Status CannotRead(const MosaicStack& stack) {
-  return Fail(ErrorCode::kIo, "{}: rows of the mosaics cannot be read back", stack.lit[0].name);
+bool IsNoiseKnown(const MosaicStack& stack) {
+  return std::ranges::all_of(stack.lit, [](const MosaicFrame& frame) {
+    return frame.gain_dn > 0.0 || frame.read_dn > 0.0;
+  });
 }
 
 // Rows [begin, end) on all threads, their sums in order.
@@ -97,7 +88,7 @@ Status SolveRowsOfMosaic(const MosaicJob& job, int begin, int end, const Task& t
   for (const PieceSummary& piece : pieces) {
     total.Add(piece);
   }
-  return status && !is_read ? CannotRead(job.stack) : status;
+  return status && !is_read ? tl::unexpected(CannotReadBack(job.stack)) : status;
 }
 
 // A row by itself: totals, and the albedo of its sites' own colours. False where it cannot be read.
@@ -117,7 +108,7 @@ bool SolveRowAlone(const MosaicJob& job, int row, PieceSummary& summary, std::ve
 // to be doubted in what noise hides.
 class Probe {
  public:
-  explicit Probe(MosaicJob& job) : job_(job), rows_(std::min(kProbes, job.stack.size_px.height)) {}
+  explicit Probe(MosaicJob& job) : job_(job), places_(RowsLookedAt(job.stack, job.mask)) {}
 
   Status Run(const Task& task) {
     const Task silent{.threads = task.threads, .progress = nullptr, .cancel = task.cancel};
@@ -133,33 +124,29 @@ class Probe {
   }
 
  private:
-  [[nodiscard]] int RowOf(int probe) const {
-    return static_cast<int>((static_cast<int64_t>(probe) * 2 + 1) * job_.stack.size_px.height /
-                            (int64_t{2} * rows_));
-  }
-
   Status SolveRows(const Task& task) {
-    std::vector<PieceSummary> pieces(static_cast<size_t>(rows_));
+    std::vector<PieceSummary> pieces(places_.size());
     std::atomic<bool> is_read = true;
-    const Status status = ParallelFor(rows_, 1, task, [&](int probe, int) {
-      std::vector<float> own;
-      if (!SolveRowAlone(job_, RowOf(probe), pieces[static_cast<size_t>(probe)], own)) {
-        is_read = false;
-      }
-    });
+    const Status status =
+        ParallelFor(static_cast<int>(places_.size()), 1, task, [&](int probe, int) {
+          const auto at = static_cast<size_t>(probe);
+          std::vector<float> own;
+          if (!SolveRowAlone(job_, places_[at], pieces[at], own)) {
+            is_read = false;
+          }
+        });
     total_ = {};
     for (const PieceSummary& piece : pieces) {
       total_.Add(piece);
     }
-    return status && !is_read ? CannotRead(job_.stack) : status;
+    return status && !is_read ? tl::unexpected(CannotReadBack(job_.stack)) : status;
   }
 
   [[nodiscard]] std::optional<Sheen> FindSheenOfSites() const {
     MosaicSite site(job_.stack, job_.rig, job_.options.least_squares, true);
     std::vector<SheenSamples> samples;
-    const int columns = static_cast<int>(kSheenPixels) / rows_ + 1;
-    for (int probe = 0; probe < rows_; ++probe) {
-      const int row = RowOf(probe);
+    const int columns = static_cast<int>(kSheenPixels / places_.size()) + 1;
+    for (const int row : places_) {
       MosaicPiece piece;
       job_.feed.Read(row, row + 1, piece);
       for (int j = 0; j < columns && piece.IsRead(); ++j) {
@@ -181,12 +168,12 @@ class Probe {
   }
 
   MosaicJob& job_;
-  int rows_;
+  std::vector<int> places_;
   PieceSummary total_;
 };
 
-SolveSummary SummaryOf(const PieceSummary& total, const MosaicJob& job, const Task& task,
-                       double seconds) {
+SolveSummary SummaryOf(const PieceSummary& total, const MosaicJob& job, bool is_noise_known,
+                       const Task& task, double seconds) {
   SolveSummary summary = total.counts;
   summary.pixels = summary.solved + summary.dark + summary.too_few_samples + summary.saturated +
                    summary.ill_conditioned;
@@ -194,8 +181,8 @@ SolveSummary SummaryOf(const PieceSummary& total, const MosaicJob& job, const Ta
   summary.threads = task.ThreadCount();
   if (job.options.mode) {
     ReportRungs(total, summary);
-    summary.noise_known = true;
-    summary.noise_scale = 1.0;
+    summary.noise_known = is_noise_known;
+    summary.noise_scale = is_noise_known ? 1.0 : std::sqrt(job.stack.lit[0].gain_dn);
   }
   if (job.sheen) {
     summary.sheen_alpha = job.sheen->alpha;
@@ -220,7 +207,7 @@ class BandSolver {
     below_.clear();
     const Status status = SolveRowsOfMosaic(job_, begin, end, task_, rows_, total_);
     if (status && end < job_.stack.size_px.height && !SolveRowAlone(job_, end, ignored, below_)) {
-      return CannotRead(job_.stack);
+      return tl::unexpected(CannotReadBack(job_.stack));
     }
     return status.and_then([&] { return InterpolateAlbedo(begin, end); });
   }
@@ -259,6 +246,19 @@ class BandSolver {
   std::vector<float> below_;
 };
 
+Status MeasureNoiseInto(const Rig& rig, const std::optional<Mask>& mask,
+                        const MosaicOptions& options, const Task& task, MosaicStack& stack) {
+  const Result<double> gain = MeasureGain(stack, rig, mask, options.least_squares, task);
+  if (!gain) {
+    return tl::unexpected(gain.error());
+  }
+  for (MosaicFrame& frame : stack.lit) {
+    frame.gain_dn = *gain;
+    frame.read_dn = kRoundingDn;
+  }
+  return {};
+}
+
 // What all solves have in common: `solve_bands` hands every band to the solver, in order.
 Result<SolveSummary> SolveBandsBy(const MosaicStack& stack, const Rig& rig,
                                   const std::optional<Mask>& mask, const MosaicOptions& options,
@@ -266,18 +266,26 @@ Result<SolveSummary> SolveBandsBy(const MosaicStack& stack, const Rig& rig,
                                   const std::function<Status(BandSolver&)>& solve_bands) {
   const Clock::time_point start = Clock::now();
   if (const Status status =
-          options.Validate().and_then([&] { return CheckMosaics(stack, rig, mask, options); });
+          options.Validate().and_then([&] { return CheckMosaics(stack, rig, mask); });
       !status) {
     return tl::unexpected(status.error());
   }
+  MosaicStack weighed = stack;
+  const bool is_known = IsNoiseKnown(stack);
+  if (options.mode && !is_known) {
+    const Status measured = MeasureNoiseInto(rig, mask, options, task, weighed);
+    if (!measured) {
+      return tl::unexpected(measured.error());
+    }
+  }
   const Result<MosaicFeed> feed =
-      MosaicFeed::Make(stack, rig, options.least_squares, options.mode.has_value());
+      MosaicFeed::Make(weighed, rig, options.least_squares, options.mode.has_value());
   if (!feed) {
     return tl::unexpected(feed.error());
   }
   const std::array<float, 256> limit = MisfitLimits(1.0, options.false_alarms);
   PiecePool pieces;
-  MosaicJob job{stack, rig, mask ? &*mask : nullptr, options, *feed, pieces, limit, {}, {}};
+  MosaicJob job{weighed, rig, mask ? &*mask : nullptr, options, *feed, pieces, limit, {}, {}};
   if (const Status probed = options.mode == LadderMode::kAuto ? Probe(job).Run(task) : Status();
       !probed) {
     return tl::unexpected(probed.error());
@@ -285,7 +293,7 @@ Result<SolveSummary> SolveBandsBy(const MosaicStack& stack, const Rig& rig,
   task.BeginStage("solving", stack.size_px.height);
   BandSolver solver(job, task);
   return solve_bands(solver).map(
-      [&] { return SummaryOf(solver.Total(), job, task, SecondsFrom(start)); });
+      [&] { return SummaryOf(solver.Total(), job, is_known, task, SecondsFrom(start)); });
 }
 
 }  // namespace

@@ -44,16 +44,16 @@ using BandSink = std::function<Status(int first_row, const NormalField& band)>;
 /// c is the site's colour, r_k its reading, N^0 the same without weights. Usable is as in
 /// solver/lambertian.h, with the reading in place of three samples. Uncertainty, misfit and rung 2
 /// are those of solver/ladder.h with one channel; the noise is the sensor's own, s = 1, because no
-/// interpolation has changed it. Rung 2 also searches in the colours interpolated from a site's
+/// interpolation has changed it. Where the stack does not know it, solver/mosaic_noise.h measures a gain. Rung 2 also searches in the colours interpolated from a site's
 /// neighbours, and takes what it finds where samples spread less than half as much and as many agree:
 /// highlights on coloured cloth. A sheen (rung 3) is looked for where more than 2 of 100 sites of some
 /// rows climb.
 ///
-/// stack    K lit mosaics of H x W with the noise of their readings, where a ladder is asked for
+/// stack    K lit mosaics of H x W
 /// rig      K lights in the order of the frames; the camera, where a light is not distant
 /// mask     H x W or nothing
 /// Returns  H x W, as SolveLadder; without `mode` as SolveLambertian. `residual` is of the own colour
-/// Errors   as SolveLambertian; kBadData where a ladder has no noise to go by, or the mosaic is
+/// Errors   as SolveLambertian; kBadData where nothing tells a ladder of the noise, or the mosaic is
 ///          narrower than 64 sites; kIo where rows cannot be read; what the sink returns
 /// Cost     O(H W K): nine tenths of what the same solve of interpolated colours takes, and the
 ///          interpolating is saved; the same bits for any number of threads and any band_rows

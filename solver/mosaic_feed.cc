@@ -11,6 +11,8 @@
 namespace sateen {
 namespace {
 
+constexpr size_t kRowsLookedAt = 32;
+
 // Variance of a white diffuser's i' under light 0, so that float holds weights in any units.
 double NoiseUnit(const MosaicStack& stack, const Light& light, double flux_scale) {
   const SiteNoise noise = NoiseAt(stack, 0, 0);
@@ -99,6 +101,28 @@ Result<MosaicFeed> MosaicFeed::Make(const MosaicStack& stack, const Rig& rig,
     feed.consensus_.lights.push_back(ConsensusLightOf(feed.params_.lights.back()));
   }
   return feed;
+}
+
+std::vector<int> RowsLookedAt(const MosaicStack& stack, const Mask* mask) {
+  std::vector<int> inside;
+  for (int row = 0; row < stack.size_px.height; ++row) {
+    const uint8_t* const of_row =
+        mask == nullptr ? nullptr : mask->pixels.data() + mask->Index(0, row);
+    if (mask == nullptr || std::any_of(of_row, of_row + stack.size_px.width,
+                                       [](uint8_t value) { return value != 0; })) {
+      inside.push_back(row);
+    }
+  }
+  std::vector<int> rows(std::min(kRowsLookedAt, inside.size()));
+  for (size_t j = 0; j < rows.size(); ++j) {
+    rows[j] = inside[(2 * j + 1) * inside.size() / (2 * rows.size())];
+  }
+  return rows;
+}
+
+Error CannotReadBack(const MosaicStack& stack) {
+  return {ErrorCode::kIo,
+          fmt::format("{}: rows of the mosaics cannot be read back", stack.lit[0].name)};
 }
 
 MosaicPiece PiecePool::Take() {

@@ -79,6 +79,12 @@ class PiecePool {
   std::vector<MosaicPiece> idle_;
 };
 
+// Rows that are solved first of all, for what they tell of the whole: they lie evenly over those with a
+// pixel inside the mask, of the whole image or null.
+[[nodiscard]] std::vector<int> RowsLookedAt(const MosaicStack& stack, const Mask* mask);
+
+[[nodiscard]] Error CannotReadBack(const MosaicStack& stack);
+
 // Feeds rows of a mosaic stack, which it borrows and which must have been checked, to the kernels.
 class MosaicFeed {
  public:

@@ -44,14 +44,13 @@ class MosaicLoader : public ::testing::Test {
     return temp_.Path() / fmt::format("frame{}.dng", k);
   }
   [[nodiscard]] Result<LoadedMosaics> Load(const MosaicMemory& memory = {}) const {
-    return LoadMosaics(plan_, temp_.Path(), {}, memory);
+    return LoadMosaics(plan_, noise_, temp_.Path(), {}, memory);
   }
-  [[nodiscard]] std::string WhyNot(bool by_noise = true) const {
-    return WhyNoMosaics(plan_, by_noise).value_or("");
-  }
+  [[nodiscard]] std::string WhyNot() const { return WhyNoMosaics(plan_).value_or(""); }
 
   testing::TempFolder temp_;
   CapturePlan plan_;
+  SensorNoise noise_{.gain_dn = 0.25, .read_dn = 3.0, .source = "the rig"};
 };
 
 std::vector<uint16_t> AllOf(const LoadedMosaics& mosaics, size_t frame) {
@@ -124,15 +123,12 @@ TEST_F(MosaicLoader, AFileThatChangedOrDoesNotFitIsNamed) {
 
 TEST_F(MosaicLoader, SaysWhyACaptureHasNoMosaics) {
   EXPECT_EQ(WhyNot(), "");
-  plan_.rig.response->read_noise_dn.reset();
-  EXPECT_THAT(WhyNot(), HasSubstr("gain and read noise"));
-  EXPECT_EQ(WhyNot(false), "");
   plan_.lit[1][0].shift_px = {0.0, 0.4};
-  EXPECT_THAT(WhyNot(false), HasSubstr("moved"));
+  EXPECT_THAT(WhyNot(), HasSubstr("moved"));
   plan_.lit[0].push_back(plan_.lit[1][0]);
-  EXPECT_THAT(WhyNot(false), HasSubstr("several exposures"));
+  EXPECT_THAT(WhyNot(), HasSubstr("several exposures"));
   plan_.lit[0] = {FrameFile{.path = "a.exr"}};
-  EXPECT_THAT(WhyNot(false), HasSubstr("not camera RAW"));
+  EXPECT_THAT(WhyNot(), HasSubstr("not camera RAW"));
 }
 
 // The same radiance as in the domain of colours, where a site keeps its own value.
