@@ -1,5 +1,6 @@
 #include "solver/ladder.h"
 
+#include <Eigen/Core>
 #include <algorithm>
 #include <array>
 #include <chrono>
@@ -7,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/angle.h"
 #include "core/parallel.h"
 #include "solver/climb.h"
 #include "solver/consensus.h"
@@ -48,6 +50,60 @@ Status DoubtLeastSquares(const Doubt& doubt, const Task& task, NormalField& fiel
   total.least_squares_deg = 0.0;
   for (const double sum : sums) {
     total.least_squares_deg += sum;
+  }
+  return status;
+}
+
+// |n(-1) - 2 n + n(+1)| of neighbours `step` apart; one that is unsolved or beyond the border is as far
+// from n as the other.
+float BendAt(const NormalField& field, size_t p, size_t step, bool has_before, bool has_after) {
+  const auto normal_at = [&](size_t q) {
+    return Eigen::Vector3f(field.normal[0].pixels[q], field.normal[1].pixels[q],
+                           field.normal[2].pixels[q]);
+  };
+  const bool before = has_before && IsSolved(field, p - step);
+  const bool after = has_after && IsSolved(field, p + step);
+  const Eigen::Vector3f n = normal_at(p);
+  if (before && after) {
+    return (normal_at(p - step) - 2.0F * n + normal_at(p + step)).norm();
+  }
+  return before  ? 2.0F * (normal_at(p - step) - n).norm()
+         : after ? 2.0F * (normal_at(p + step) - n).norm()
+                 : 0.0F;
+}
+
+// (16), and the sums of the uncertainties anew.
+Status DoubtInterpolation(const Task& task, NormalField& field, PieceSummary& total) {
+  const ImageSize size = field.reason.Size();
+  const auto width = static_cast<size_t>(size.width);
+  std::vector<PieceSummary> rows(static_cast<size_t>(size.height));
+  const Task silent{.threads = task.threads, .cancel = task.cancel};
+  Status status = ParallelFor(size.height, RowsPerPiece(size), silent, [&](int begin, int end) {
+    for (int row = begin; row < end; ++row) {
+      PieceSummary& sums = rows[static_cast<size_t>(row)];
+      for (size_t x = 0; x < width; ++x) {
+        const size_t p = field.model.Index(0, row) + x;
+        if (!IsSolved(field, p)) {
+          continue;
+        }
+        const float bend = std::hypot(BendAt(field, p, 1, x > 0, x + 1 < width),
+                                      BendAt(field, p, width, row > 0, row + 1 < size.height));
+        float& uncertainty = field.uncertainty.pixels[p];
+        uncertainty =
+            std::min(180.0F, std::hypot(uncertainty, 0.5F * bend * static_cast<float>(kDegPerRad)));
+        const auto rung = static_cast<Rung>(field.model.pixels[p]);
+        double& sum = rung <= Rung::kUnchecked ? sums.least_squares_deg
+                      : rung == Rung::kSheen   ? sums.sheen_deg
+                                               : sums.robust_deg;
+        sum += static_cast<double>(uncertainty);
+      }
+    }
+  });
+  total.least_squares_deg = total.robust_deg = total.sheen_deg = 0.0;
+  for (const PieceSummary& row : rows) {
+    total.least_squares_deg += row.least_squares_deg;
+    total.robust_deg += row.robust_deg;
+    total.sheen_deg += row.sheen_deg;
   }
   return status;
 }
@@ -150,6 +206,11 @@ Status SolveLadderInto(const LightStack& stack, const Rig& rig, const std::optio
   PieceSummary total;
   if (Status status = ClimbAllRows(climb, task, field, total); !status) {
     return status;
+  }
+  if (std::ranges::all_of(stack, &LightFrame::raw)) {
+    if (Status status = DoubtInterpolation(task, field, total); !status) {
+      return status;
+    }
   }
   SolveSummary& summary = field.summary;
   AddCounts(total.counts, summary);

@@ -89,6 +89,11 @@ struct LadderOptions {
 /// It is looked for where rung 1 explains fewer than 80 of 100 pixels, and believed where (14)
 /// explains 90; then every pixel that it explains takes it, with uncertainty (4) and half a degree.
 ///
+/// Where all frames are camera RAW, their colours are interpolated, and no rung sees what that does to
+/// the normals where they bend from pixel to pixel:
+///
+///     uncertainty <- hypot(uncertainty, b / 2),  b^2 = |n(x-1) - 2 n + n(x+1)|^2 + the same in y  (16)
+///
 /// stack, rig, mask, errors   as SolveLambertian
 /// Cost     rung 1 about 1.6 times SolveLambertian; rung 2 O(K^2 + K 10^3) a pixel; rung 3 some
 ///          microseconds a pixel and 0.1 s to find; the same bits for any number of threads

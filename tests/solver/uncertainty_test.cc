@@ -99,6 +99,41 @@ TEST(SolveLadder, UncertaintyIsUnknownWhereNothingTellsOfTheNoise) {
   EXPECT_EQ(field.summary.noise_scale, 0.0);
 }
 
+// By hand from the normals at some pixels: inside, at the border, beside one that is masked out.
+TEST(SolveLadder, UncertaintyOfInterpolatedColoursHoldsHowNormalsBend) {
+  const Rig rig = TwoRings();
+  RenderedRelief rendered = RippleOf({.full_scale = 2.0}, rig, {60, 40});
+  Mask mask({60, 40}, 255);
+  mask.At(20, 10) = 0;
+  const NormalField plain = SolveLadder(rendered.stack, rig, mask).value();
+  for (LightFrame& frame : rendered.stack) {
+    frame.raw = true;
+  }
+  const NormalField raw = SolveLadder(rendered.stack, rig, mask).value();
+  const auto normal = [&](int x, int y) {
+    return Eigen::Vector3d(static_cast<double>(raw.normal[0].At(x, y)),
+                           static_cast<double>(raw.normal[1].At(x, y)),
+                           static_cast<double>(raw.normal[2].At(x, y)));
+  };
+  const auto bend = [&](int x, int y, int dx, int dy) {
+    return (normal(x - dx, y - dy) - 2.0 * normal(x, y) + normal(x + dx, y + dy)).squaredNorm();
+  };
+  const auto expect = [&](int x, int y, double bend_squared) {
+    const auto before = static_cast<double>(plain.uncertainty.At(x, y));
+    EXPECT_NEAR(static_cast<double>(raw.uncertainty.At(x, y)),
+                std::hypot(before, 0.5 * std::sqrt(bend_squared) * kDegPerRad), 1e-4)
+        << x << ", " << y;
+  };
+  expect(30, 20, bend(30, 20, 1, 0) + bend(30, 20, 0, 1));
+  expect(0, 20, 4.0 * (normal(1, 20) - normal(0, 20)).squaredNorm() + bend(0, 20, 0, 1));
+  expect(21, 10, 4.0 * (normal(22, 10) - normal(21, 10)).squaredNorm() + bend(21, 10, 0, 1));
+  expect(20, 11, bend(20, 11, 1, 0) + 4.0 * (normal(20, 12) - normal(20, 11)).squaredNorm());
+  EXPECT_EQ(raw.uncertainty.At(20, 10), 0.0F);
+  EXPECT_GT(raw.summary.least_squares.mean_uncertainty_deg,
+            plain.summary.least_squares.mean_uncertainty_deg);
+  EXPECT_EQ(raw.normal[0].pixels, plain.normal[0].pixels);
+}
+
 TEST(SolveLadder, SmoothFramesOfEightBitsAreNotWithoutNoise) {
   const SensorModel eight_bits{.bits = 8, .electrons = 1e9, .read_noise_electrons = 0.0};
   for (const int count : {3, 4, 10}) {
