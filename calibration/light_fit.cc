@@ -184,6 +184,8 @@ Status FitToAll(const LightResiduals& residuals, const RungFit& best, const Ligh
   result.flux_sd = covariance.diagonal().tail<3>().cwiseSqrt();
   result.direction_sd_rad = WorstDirectionSd(residuals.Samples(), result.light.position_mm,
                                              covariance.topLeftCorner<3, 3>());
+  result.light.position_sd_mm = result.position_sd_mm;
+  result.light.flux_sd = std::sqrt(result.flux_sd.squaredNorm() / 3.0);
   return {};
 }
 

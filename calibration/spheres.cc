@@ -150,6 +150,7 @@ Result<SphereLight> LightFromRays(const std::vector<SphereRay>& rays, bool has_c
       result.light.position_mm = meeting->at;
       result.residual_rad = missed;
       result.position_sd_mm = covariance.diagonal().cwiseSqrt();
+      result.light.position_sd_mm = result.position_sd_mm;
     }
   }
   if (result.residual_rad > options.most_residual_rad) {

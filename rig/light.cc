@@ -59,6 +59,17 @@ Status Light::Validate(std::string_view what) const {
     return Fail(ErrorCode::kBadData, "{}: intensity {}; need three finite numbers > 0", what,
                 Show(flux_rgb));
   }
+  if (position_sd_mm && !(position_sd_mm->allFinite() && position_sd_mm->minCoeff() >= 0.0)) {
+    return Fail(ErrorCode::kBadData, "{}: position_sd_mm {}; need three finite numbers >= 0", what,
+                Show(*position_sd_mm));
+  }
+  if (direction_sd_deg && !(*direction_sd_deg >= 0.0 && *direction_sd_deg <= 90.0)) {
+    return Fail(ErrorCode::kBadData, "{}: direction_sd_deg {:.6g}; need 0 to 90", what,
+                *direction_sd_deg);
+  }
+  if (flux_sd && !(*flux_sd >= 0.0 && *flux_sd <= 1.0)) {
+    return Fail(ErrorCode::kBadData, "{}: flux_sd {:.6g}; need 0 to 1", what, *flux_sd);
+  }
   return {};
 }
 

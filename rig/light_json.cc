@@ -69,10 +69,14 @@ Result<Light> ReadLight(JsonReader reader, const std::string& what) {
   light.model = ReadModel(reader);
   if (light.model == LightModel::kDistant) {
     light.direction = Vector3(reader.Numbers("direction", 3));
+    light.direction_sd_deg = reader.OptionalNumber("direction_sd_deg");
     reader.Require(light.direction.z() > 0.0, "direction",
                    fmt::format("has z = {}; need z > 0, above the table", light.direction.z()));
   } else {
     light.position_mm = Vector3(reader.Numbers("position_mm", 3));
+    if (const auto sd = reader.OptionalNumbers("position_sd_mm", 3)) {
+      light.position_sd_mm = Vector3(*sd);
+    }
   }
   if (IsLed(light.model)) {
     light.axis = Vector3(reader.Numbers("axis", 3));
@@ -86,6 +90,7 @@ Result<Light> ReadLight(JsonReader reader, const std::string& what) {
     light.field = *std::move(field);
   }
   light.flux_rgb = Vector3(reader.Numbers("flux_rgb", 3));
+  light.flux_sd = reader.OptionalNumber("flux_sd");
   if (Status status = reader.Finish().and_then([&] { return light.Validate(what); }); !status) {
     return tl::unexpected(status.error());
   }
@@ -104,6 +109,12 @@ nlohmann::ordered_json ToJson(const Light& light) {
   } else {
     json["position_mm"] = ToJson(light.position_mm);
   }
+  if (light.direction_sd_deg && light.model == LightModel::kDistant) {
+    json["direction_sd_deg"] = *light.direction_sd_deg;
+  }
+  if (light.position_sd_mm && light.model != LightModel::kDistant) {
+    json["position_sd_mm"] = ToJson(*light.position_sd_mm);
+  }
   if (IsLed(light.model)) {
     json["axis"] = ToJson(light.axis);
     json["anisotropy"] = light.anisotropy;
@@ -116,6 +127,9 @@ nlohmann::ordered_json ToJson(const Light& light) {
                      {"gain", light.field.gain}};
   }
   json["flux_rgb"] = ToJson(light.flux_rgb);
+  if (light.flux_sd) {
+    json["flux_sd"] = *light.flux_sd;
+  }
   return json;
 }
 

@@ -193,6 +193,7 @@ Climb MakeClimb(const LightStack& stack, const Rig& rig, const LadderOptions& op
           noise,
           scale_squared,
           MisfitLimits(scale_squared, options.false_alarms),
+          LightDoubt::Make(rig, stack[0].rgb.Size()),
           std::nullopt};
 }
 
@@ -205,6 +206,9 @@ PieceSummary SolveAndClimb(const Climb& climb, int begin, int end, NormalField& 
   const std::span<float> misfits(memory.get(), count);
   climb.rows.SolveWeighted(begin, end, geometry, std::sqrt(climb.scale_squared), field, misfits,
                            summary.counts);
+  for (int row = begin; climb.light_doubt && row < end; ++row) {
+    climb.light_doubt->AddToRow(row, field.reason.Index(0, row), field);
+  }
   if (climb.sheen) {
     summary.sheen_seconds =
         SecondsOf([&] { SolveUnderSheen(climb, first, count, field, summary); });

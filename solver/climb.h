@@ -5,6 +5,7 @@
 
 #include "solver/ladder.h"
 #include "solver/least_squares.h"
+#include "solver/light_doubt.h"
 #include "solver/rungs.h"
 #include "solver/sheen.h"
 
@@ -19,6 +20,7 @@ struct Climb {
   const StackNoise& noise;
   double scale_squared = 1.0;         // s^2
   std::array<float, 256> limit = {};  // of the misfit, by usable samples
+  std::optional<LightDoubt> light_doubt;
   std::optional<Sheen> sheen;
 };
 

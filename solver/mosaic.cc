@@ -284,8 +284,10 @@ Result<SolveSummary> SolveBandsBy(const MosaicStack& stack, const Rig& rig,
     return tl::unexpected(feed.error());
   }
   const std::array<float, 256> limit = MisfitLimits(1.0, options.false_alarms);
+  const std::optional<LightDoubt> light_doubt = LightDoubt::Make(rig, stack.size_px);
   PiecePool pieces;
-  MosaicJob job{weighed, rig, mask ? &*mask : nullptr, options, *feed, pieces, limit, {}, {}};
+  MosaicJob job{weighed, rig, mask ? &*mask : nullptr, options, *feed, pieces, limit, light_doubt,
+                {},      {}};
   if (const Status probed = options.mode == LadderMode::kAuto ? Probe(job).Run(task) : Status();
       !probed) {
     return tl::unexpected(probed.error());

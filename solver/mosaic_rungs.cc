@@ -177,6 +177,9 @@ bool SolvePiece(const MosaicJob& job, int begin, int end, SiteRows& rows, PieceS
     const int64_t solved = SolveInDouble(job, piece, in_double, rows);
     summary.counts.resolved_by_reference += in_double ? 0 : solved;
   }
+  for (int row = begin; job.options.mode && job.light_doubt && row < end; ++row) {
+    job.light_doubt->AddToRow(row, rows.Index(row), rows.Field());
+  }
   if (job.options.mode) {
     ClimbSites(job, piece, rows, summary);
   }

@@ -5,6 +5,7 @@
 
 #include "imaging/mosaic_stack.h"
 #include "rig/rig.h"
+#include "solver/light_doubt.h"
 #include "solver/mosaic.h"
 #include "solver/mosaic_feed.h"
 #include "solver/rungs.h"
@@ -21,6 +22,7 @@ struct MosaicJob {
   const MosaicFeed& feed;
   PiecePool& pieces;
   const std::array<float, 256>& limit;  // of the misfit, by usable readings
+  const std::optional<LightDoubt>& light_doubt;
   Doubt doubt;
   std::optional<Sheen> sheen;
 };

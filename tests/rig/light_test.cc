@@ -114,6 +114,12 @@ TEST(Light, ValidateNamesTheFieldOutOfRange) {
               HasSubstr("anisotropy -1; need 0 to 50"));
   EXPECT_THAT(message(LightModel::kDistant, [](Light& l) { l.flux_rgb.y() = 0; }),
               HasSubstr("intensity [1, 0, 3]; need three finite numbers > 0"));
+  EXPECT_THAT(message(LightModel::kNear, [](Light& l) { l.position_sd_mm.emplace(1, -1, 1); }),
+              HasSubstr("position_sd_mm [1, -1, 1]; need three finite numbers >= 0"));
+  EXPECT_THAT(message(LightModel::kDistant, [](Light& l) { l.direction_sd_deg = 91; }),
+              HasSubstr("direction_sd_deg 91; need 0 to 90"));
+  EXPECT_THAT(message(LightModel::kDistant, [&](Light& l) { l.flux_sd = infinity; }),
+              HasSubstr("flux_sd inf; need 0 to 1"));
 }
 
 TEST(Light, ValidateLooksAtTheFieldsOfTheModelOnly) {

@@ -1,0 +1,40 @@
+#pragma once
+
+#include <array>
+#include <optional>
+#include <vector>
+
+#include "rig/rig.h"
+#include "solver/lambertian.h"
+
+namespace sateen {
+
+/// What errors of the lights' calibration do to a normal. A light that is off by the angle delta, with an
+/// irradiance off by the share epsilon, moves the solution of N . l_k = i'_k, k = 1 .. K, by
+///
+///     dN = -sum_k g_k (delta_k . N + epsilon_k i'_k),   (g_1 .. g_K) = pseudo-inverse of (l_k^T)   (1)
+///
+/// With independent errors of the standard deviations that the rig has, s a light's position, d its distance,
+///
+///     sd(delta) = sd(s) / d, or that of the direction,  sd(epsilon)^2 = sd(phi)^2 + (2 sd(s) / d)^2  (2)
+///     angle^2 = tr Q - n.Q n,  Q = sum_k g_k g_k^T (sd(delta)^2 (1 - c_k^2) + sd(epsilon)^2 c_k^2)   (3)
+///
+/// c_k = z . l_k stands for n . l_k, and sd(s) is the root mean square over the axes, so that Q is one of the
+/// place alone; it is found in the middle of each tile of 64 x 64 pixels.
+class LightDoubt {
+ public:
+  // Nothing where no light of the rig has a standard deviation. The rig has been checked against the size.
+  [[nodiscard]] static std::optional<LightDoubt> Make(const Rig& rig, ImageSize size);
+
+  // Adds the angle (3) to field.uncertainty of the solved pixels of a row of the image, the first of which
+  // has the index `first` in the field.
+  void AddToRow(int row, size_t first, NormalField& field) const;
+
+ private:
+  using Matrix = std::array<float, 6>;  // xx, yy, zz, xy, xz, yz of Q in square degrees
+
+  int columns_ = 0;  // of tiles
+  std::vector<Matrix> tiles_;
+};
+
+}  // namespace sateen

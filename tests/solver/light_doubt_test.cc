@@ -1,0 +1,115 @@
+#include "solver/light_doubt.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "core/angle.h"
+#include "simulation/random.h"
+#include "simulation/rigs.h"
+#include "tests/solver/ladder_cases.h"
+
+namespace sateen {
+namespace {
+
+using testing::DistantRig;
+using testing::Render;
+using testing::RippleOf;
+
+constexpr ImageSize kSmall{96, 70};
+
+// Three standard normal deviates for a light of a rig.
+Eigen::Vector3d Deviates(uint64_t rig, size_t light) {
+  return {NormalDeviate(rig, 7 * light), NormalDeviate(rig, 7 * light + 1),
+          NormalDeviate(rig, 7 * light + 2)};
+}
+
+// The same light off by what its standard deviations say.
+Light Disturbed(const Light& light, uint64_t rig, size_t k) {
+  Light off = light;
+  const Eigen::Vector3d deviates = Deviates(rig, k);
+  if (light.model == LightModel::kDistant) {
+    const double sd = *light.direction_sd_deg * kRadPerDeg / std::sqrt(2.0);
+    const Eigen::Vector3d across = light.direction.unitOrthogonal();
+    off.direction = (light.direction +
+                     sd * (deviates[0] * across + deviates[1] * light.direction.cross(across)))
+                        .normalized();
+  } else {
+    off.position_mm += light.position_sd_mm->cwiseProduct(deviates);
+  }
+  off.flux_rgb *= 1.0 + *light.flux_sd * NormalDeviate(rig, 7 * k + 3);
+  return off;
+}
+
+// Root mean square over 60 disturbed rigs, of some pixels: angle over what LightDoubt says. 1 = honest.
+double ActualOverPredicted(const Rig& rig, const RenderedRelief& truth) {
+  const LightDoubt doubt = LightDoubt::Make(rig, kSmall).value();
+  double sum = 0.0;
+  int count = 0;
+  for (uint64_t draw = 0; draw < 60; ++draw) {
+    Rig off = rig;
+    for (size_t k = 0; k < rig.lights.size(); ++k) {
+      off.lights[k] = Disturbed(rig.lights[k], draw, k);
+    }
+    NormalField field = SolveLambertian(truth.stack, off, std::nullopt).value();
+    field.uncertainty = Image<float>(kSmall);
+    for (int row = 0; row < kSmall.height; ++row) {
+      doubt.AddToRow(row, field.reason.Index(0, row), field);
+    }
+    Image<float> error;
+    EXPECT_TRUE(AngularErrorDeg(field, truth.normal, &error));
+    for (size_t p = 5; p < error.pixels.size(); p += 97) {
+      sum += std::pow(static_cast<double>(error.pixels[p] / field.uncertainty.pixels[p]), 2.0);
+      ++count;
+    }
+  }
+  return std::sqrt(sum / count);
+}
+
+TEST(LightDoubt, IsTheActualErrorUnderLightsThatAreOff) {
+  Rig distant = DistantRig(DistantRing(8, 40.0 * kRadPerDeg));
+  for (Light& light : distant.lights) {
+    light.direction_sd_deg = 0.5;
+    light.flux_sd = 0.001;
+  }
+  EXPECT_NEAR(ActualOverPredicted(distant, Render(distant, kSmall)), 1.0, 0.1);
+  for (Light& light : distant.lights) {
+    light.direction_sd_deg = 0.01;
+    light.flux_sd = 0.02;
+  }
+  EXPECT_NEAR(ActualOverPredicted(distant, Render(distant, kSmall)), 1.0, 0.1);
+  Rig near = RingRig(kSmall, LightModel::kNear);
+  for (Light& light : near.lights) {
+    light.position_sd_mm = {2.0, 2.0, 2.0};
+    light.flux_sd = 0.001;
+  }
+  EXPECT_NEAR(ActualOverPredicted(near, Render(near, kSmall)), 1.0, 0.1);
+}
+
+TEST(LightDoubt, ARigThatSaysNothingHasNone) {
+  EXPECT_FALSE(LightDoubt::Make(DistantRig(DistantRing(8, 40.0 * kRadPerDeg)), kSmall));
+}
+
+TEST(LightDoubt, GoesIntoTheUncertaintyOfTheLadder) {
+  Rig rig = testing::TwoRings();
+  const RenderedRelief rendered = RippleOf({.full_scale = 2.0}, rig, kSmall);
+  const NormalField sure = SolveLadder(rendered.stack, rig, std::nullopt).value();
+  for (Light& light : rig.lights) {
+    light.direction_sd_deg = 1.0;
+  }
+  const NormalField unsure = SolveLadder(rendered.stack, rig, std::nullopt).value();
+  NormalField expected = sure;
+  const LightDoubt doubt = LightDoubt::Make(rig, kSmall).value();
+  doubt.AddToRow(30, sure.reason.Index(0, 30), expected);
+  for (int x = 0; x < kSmall.width; ++x) {
+    if (sure.model.At(x, 30) == static_cast<uint8_t>(Rung::kLeastSquares)) {
+      EXPECT_FLOAT_EQ(unsure.uncertainty.At(x, 30), expected.uncertainty.At(x, 30));
+      EXPECT_GT(unsure.uncertainty.At(x, 30), 0.2F);
+    }
+  }
+  EXPECT_GT(unsure.summary.least_squares.mean_uncertainty_deg, 0.2);
+  EXPECT_EQ(unsure.normal[0].pixels, sure.normal[0].pixels);
+}
+
+}  // namespace
+}  // namespace sateen
