@@ -56,18 +56,25 @@ HWY_INLINE void SolveVector(const KernelParams& params, const KernelInput& input
   const V y_mm = kDistant ? hn::Zero(d) : hn::LoadU(d, input.y_mm + offset);
   Scale scale{one, one, NoLanes()};
   const Gathered gathered = GatherScaled<kDistant>(params, input, offset, x_mm, y_mm, scale, state);
-  const float* scratch = state.scratch.get();
+  float* scratch = state.scratch.get();
   const V threshold = hn::Mul(gathered.brightest, hn::Set(d, params.shadow_level));
   const NormalEquations eq = Accumulate<kDistant>(params, scratch, threshold);
   const Inverse inverse = Invert(eq.a, params.max_condition_squared);
-  const Vector3 n_rgb[3] = {Times(inverse.a, eq.b[0]), Times(inverse.a, eq.b[1]),
-                            Times(inverse.a, eq.b[2])};  // (3)
-  Vector3 n = LuminanceOf(n_rgb);
+  Vector3 n_rgb[3] = {Times(inverse.cofactor, eq.b[0]), Times(inverse.cofactor, eq.b[1]),
+                      Times(inverse.cofactor, eq.b[2])};
+  Vector3 n = Times(inverse.cofactor, LuminanceOf(eq.b));
+  NoiseUnits units;
+  if constexpr (kWeighted) {
+    units = NoiseUnitsOf<kDistant>(params.lights[0], scratch, n_rgb, n, inverse.inverse_det, scale);
+  }
+  for (Vector3* v : {&n_rgb[0], &n_rgb[1], &n_rgb[2], &n}) {
+    *v = Scaled(*v, inverse.inverse_det);  // (3)
+  }
   const M enough = hn::Ge(eq.count, hn::Set(d, 3.0F));
   Weighted weighted;
   V sum_of_squares;
   if constexpr (kWeighted) {
-    weighted = WeightedStep<kDistant>(params, scratch, threshold, n_rgb, n, eq.count, scale);
+    weighted = WeightedStep<kDistant>(params, scratch, threshold, units, n, eq.count);
     sum_of_squares = weighted.sum_of_squares;
     n = weighted.n;
   } else {

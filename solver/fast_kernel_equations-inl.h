@@ -83,8 +83,19 @@ HWY_INLINE NormalEquations Accumulate(const KernelParams& params, const float* s
 
 struct Inverse {
   Symmetric3 a;
-  M accepted;  // within the bound on the condition number
+  M accepted;           // within the bound on the condition number
+  Symmetric3 cofactor;  // a times det; det counts as 1 where it is not accepted
+  V inverse_det;
 };
+
+HWY_INLINE Vector3 Scaled(const Vector3& v, V factor) {
+  return {hn::Mul(v.x, factor), hn::Mul(v.y, factor), hn::Mul(v.z, factor)};
+}
+
+HWY_INLINE Symmetric3 Scaled(const Symmetric3& a, V factor) {
+  return {hn::Mul(a.xx, factor), hn::Mul(a.xy, factor), hn::Mul(a.xz, factor),
+          hn::Mul(a.yy, factor), hn::Mul(a.yz, factor), hn::Mul(a.zz, factor)};
+}
 
 HWY_INLINE Inverse Invert(const Symmetric3& a, float max_condition_squared) {
   const D d;
@@ -98,11 +109,8 @@ HWY_INLINE Inverse Invert(const Symmetric3& a, float max_condition_squared) {
   const V minors = hn::Add(cofactor.xx, hn::Add(cofactor.yy, cofactor.zz));
   const M accepted =
       hn::Gt(hn::Mul(det, hn::Set(d, max_condition_squared)), hn::Mul(trace, minors));
-  const V inverse = hn::Div(hn::Set(d, 1.0F), hn::IfThenElse(accepted, det, hn::Set(d, 1.0F)));
-  return {
-      {hn::Mul(cofactor.xx, inverse), hn::Mul(cofactor.xy, inverse), hn::Mul(cofactor.xz, inverse),
-       hn::Mul(cofactor.yy, inverse), hn::Mul(cofactor.yz, inverse), hn::Mul(cofactor.zz, inverse)},
-      accepted};
+  const V inverse = ReciprocalOf(hn::IfThenElse(accepted, det, hn::Set(d, 1.0F)));
+  return {Scaled(cofactor, inverse), accepted, cofactor, inverse};
 }
 
 // ---- Pass 3: residuals and refinement ----------------------------------------------------------

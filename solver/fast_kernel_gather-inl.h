@@ -19,8 +19,9 @@
 
 HWY_BEFORE_NAMESPACE();
 namespace sateen::HWY_NAMESPACE {
-// Scratch vectors of one light: l and 1 / g (near lights only), i' red, green, blue, luminance.
-constexpr size_t kScratchPerLight = 8;
+// Scratch vectors of one light: l (near lights only); i' red, green, blue, luminance; 1 / g (near lights
+// only); N . l. Of the weighted step W and misfit take the place of red and green.
+constexpr size_t kScratchPerLight = 9;
 
 // 3 K streams are more than the hardware prefetchers follow. Fetching three cache lines ahead took
 // ten near lights on two cores from 11.5 to 8.1 ns/px (floor 5.9); two to four lines do as well.

@@ -25,28 +25,6 @@ namespace {
 // Scratch vectors of one light: l, i', and what radiance is multiplied by to be i'.
 constexpr size_t kMosaicScratch = 5;
 
-// 1 / sqrt(v) to the last bits but one: division and root take as long as all the rest.
-HWY_INLINE V InverseRoot(V v) {
-  const D d;
-#if HWY_ARCH_X86
-  const V guess = hn::ApproximateReciprocalSqrt(v);
-  const V half = hn::Mul(hn::Set(d, 0.5F), hn::Mul(v, guess));
-  return hn::MulAdd(guess, hn::NegMulAdd(half, guess, hn::Set(d, 0.5F)), guess);
-#else
-  return hn::Div(hn::Set(d, 1.0F), hn::Sqrt(v));
-#endif
-}
-
-HWY_INLINE V Inverse1(V v) {
-  const D d;
-#if HWY_ARCH_X86
-  const V guess = hn::ApproximateReciprocal(v);
-  return hn::Mul(guess, hn::NegMulAdd(v, guess, hn::Set(d, 2.0F)));
-#else
-  return hn::Div(hn::Set(d, 1.0F), v);
-#endif
-}
-
 // Vectors of a light's figures for the sites of a row, which alternate between two of the pattern.
 enum SiteFigure : size_t {
   kInverseFlux,
@@ -108,7 +86,7 @@ HWY_INLINE Arrival ArrivalOf(const MosaicKernelLight& light, const MosaicKernelI
   const Vector3 to_light{hn::Sub(place.x, hn::LoadU(d, input.x_mm + offset)),
                          hn::Sub(place.y, hn::LoadU(d, input.y_mm + offset)), place.z};
   const V squared = Dot(to_light, to_light);
-  const V inverse = InverseRoot(squared);
+  const V inverse = ReciprocalRootOf(squared);
   Arrival in{
       {hn::Mul(to_light.x, inverse), hn::Mul(to_light.y, inverse), hn::Mul(to_light.z, inverse)},
       squared};
@@ -121,7 +99,7 @@ HWY_INLINE Arrival ArrivalOf(const MosaicKernelLight& light, const MosaicKernelI
   const M before = hn::Gt(cosine, hn::Zero(d));
   const V safe = hn::IfThenElse(before, cosine, hn::Set(d, 1.0F));
   const V falloff = light.anisotropy == 1.0F
-                        ? Inverse1(safe)
+                        ? ReciprocalOf(safe)
                         : hn::Exp(d, hn::Mul(hn::Set(d, -light.anisotropy), hn::Log(d, safe)));
   in.inverse_gain = hn::IfThenElseZero(before, hn::Mul(squared, falloff));
   if (light.model == LightModel::kLedField) {
@@ -264,7 +242,7 @@ HWY_INLINE void WeightedSiteStep(const MosaicKernelParams& params, const RowStat
         hn::Mul(factor, hn::MulAdd(FigureOf(figures, kShot), hn::Max(predicted, least),
                                    hn::Mul(factor, FigureOf(figures, kReadSquared))));
     const V weight = hn::IfThenElseZero(
-        u.is, Inverse1(hn::Clamp(variance, hn::Set(d, 1e-9F), hn::Set(d, 1e9F))));
+        u.is, ReciprocalOf(hn::Clamp(variance, hn::Set(d, 1e-9F), hn::Set(d, 1e9F))));
     const V r = hn::Sub(u.i, predicted);
     const V weighted = hn::Mul(weight, r);
     answer.sum_of_squares = hn::MulAdd(r, r, answer.sum_of_squares);
