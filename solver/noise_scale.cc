@@ -25,6 +25,7 @@ constexpr int64_t kMisfitsLookedAt = 1 << 12;
 constexpr int64_t kFewestMisfits = 1 << 11;
 constexpr int64_t kRun = 64;
 constexpr size_t kNeighbourStep = 3;  // differences then share no sample
+constexpr size_t kDifferencesLookedAt = 1 << 12;
 constexpr double kGoldenRatio = 0.6180339887498949;
 // Rounding's variance is 1/12 of a step squared, of which 1/6 goes for the variance of a sample; of
 // the second differences that do not vanish at least this share are single steps.
@@ -148,12 +149,16 @@ Neighbours LookAtNeighbours(const LightStack& stack, const MisfitSample& sample)
   double sum_of_means = 0.0;
   size_t count = 0;
   const auto width = static_cast<size_t>(stack[0].rgb[0].width);
+  // Of many differences some lights' at each pixel, in turn.
+  const size_t all_differences = stack.size() * (sample.pixels.size() / kNeighbourStep);
+  const size_t light_step =
+      std::clamp<size_t>(all_differences / kDifferencesLookedAt, 1, stack.size());
   for (size_t j = 1; j + 1 < sample.pixels.size(); j += kNeighbourStep) {
     const size_t p = sample.pixels[j];
     const bool inside = p % width > 0 && p % width + 1 < width && sample.pixels[j - 1] + 1 == p &&
                         sample.pixels[j + 1] == p + 1 && sample.samples[j - 1] > 0 &&
                         sample.samples[j] > 0 && sample.samples[j + 1] > 0;
-    for (size_t k = 0; inside && k < stack.size(); ++k) {
+    for (size_t k = j / kNeighbourStep % light_step; inside && k < stack.size(); k += light_step) {
       const float* i = stack[k].rgb[1].pixels.data() + p;
       const float bend = i[-1] - 2.0F * i[0] + i[1];
       const float mean = (i[-1] + i[0] + i[1]) / 3.0F;
