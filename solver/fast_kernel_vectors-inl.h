@@ -55,7 +55,7 @@ HWY_INLINE void StoreBytes(VI values, uint8_t* to) {
 }
 
 // 1 / v and 1 / sqrt(v) to the last bits but one, for v from 1e-37 to 1e37: an estimate and one step of
-// Newton's. Division and root occupy the processor five times as long.
+// Newton's, which leave the processor's only divider to others.
 HWY_INLINE V ReciprocalOf(V v) {
   const D d;
 #if HWY_ARCH_X86

@@ -74,7 +74,7 @@ struct NoiseUnits {
 
 // `n_rgb` and `n` are N_c and N times the determinant: their ratios need not wait for its reciprocal. All of
 // this is one chain, during which the processor does little else; with divisions and with N itself it was
-// longer by a quarter.
+// longer by a third.
 template <bool kDistant>
 HWY_INLINE NoiseUnits NoiseUnitsOf(const KernelLight& light, const float* slot,
                                    const Vector3* n_rgb, const Vector3& n, V inverse_det,
