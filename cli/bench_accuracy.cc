@@ -30,7 +30,7 @@ namespace fs = std::filesystem;
 constexpr int64_t kMostPixelsForComparators = 60'000;
 // Uncertainties within which at least 95 of 100 errors lie (solver/ladder.h).
 constexpr float kInterval95 = 1.96F;
-constexpr ImageSize kReliefPx = {640, 480};
+constexpr ImageSize kReliefPx = {1280, 960};
 
 struct DataSet {
   std::string name;

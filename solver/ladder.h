@@ -24,7 +24,7 @@ struct LadderOptions {
   // Noise of each frame; nothing: shot noise of a gain that is measured on the residuals.
   std::optional<StackNoise> noise;
   // A pixel climbs where noise alone would give its residual less often than this. In (0, 0.5).
-  double false_alarms = 1e-3;
+  double false_alarms = 3e-4;
   // ... and where the residual is above this fraction of the albedo, which no calibration explains
   // better. [0, 1).
   double explained_residual = 0.002;

@@ -19,7 +19,7 @@ struct MosaicOptions {
   // backend: kFast, kAuto, or kJacobiSvd for every site.
   LambertianOptions least_squares;
   // As in LadderOptions.
-  double false_alarms = 1e-3;
+  double false_alarms = 3e-4;
   double explained_residual = 0.002;
   // Rows that are solved, and handed on, together; at least 1.
   int band_rows = 256;
