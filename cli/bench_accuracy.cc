@@ -286,6 +286,7 @@ void AddBenchAccuracy(CLI::App& bench, BenchAccuracyArgs& args) {
       "Every method on every data set that is there: time, error against truth, and whether the "
       "predicted uncertainty holds; beside plain re-implementations of others' methods");
   cmd->add_option("--data", args.data, "Folder with the public data sets bunny and diligent-ball")
+      ->check(CLI::ExistingDirectory)
       ->envname("SATEEN_DATA");
   cmd->add_option(
          "--scene", args.scenes,

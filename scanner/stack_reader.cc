@@ -240,8 +240,10 @@ Status ReadFrames(const CapturePlan& plan, const ReadCaptureOptions& options, co
                   Capture& capture) {
   const std::optional<std::string> why_not = WhyNoMosaics(plan);
   if (options.domain != Domain::kRgb && !why_not) {
-    const Result<std::optional<SensorNoise>> noise =
-        options.by_noise ? FindSensorNoise(plan) : std::optional<SensorNoise>();
+    Result<std::optional<SensorNoise>> noise;
+    if (options.by_noise) {
+      noise = FindSensorNoise(plan);
+    }
     if (!noise) {
       return tl::unexpected(noise.error());
     }

@@ -32,12 +32,16 @@ const nlohmann::json& RowOf(const nlohmann::json& report, const std::string& met
   return kNone;
 }
 
+TEST(BenchAccuracy, AFolderThatIsNotThereIsAUsageError) {
+  EXPECT_EQ(BenchAccuracy({"--data", "/nonexistent"}).exit_status, 2);
+}
+
 TEST(BenchAccuracy, ComparesColoursWithMosaicsAndWritesThePage) {
   const TempFolder folder;
   const std::string page = (folder.Path() / "accuracy.md").string();
   const std::string plot = (folder.Path() / "images-accuracy.svg").string();
   const RunResult run =
-      BenchAccuracy({"--data", "/nonexistent", "--scene",
+      BenchAccuracy({"--data", folder.Path().string(), "--scene",
                      std::string(SATEEN_SOURCE_DIR) + "/samples/scenes/twill-small.json",
                      "--repeats", "1", "--json", "--markdown", page, "--plot", plot});
   ASSERT_EQ(run.exit_status, 0) << run.log;
