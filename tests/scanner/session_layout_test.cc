@@ -55,6 +55,30 @@ TEST_F(SessionLayout, FollowsTheOrderOfTheRigNotOfTheFrames) {
   EXPECT_THAT(capture.stack[0].name, HasSubstr("east.exr"));
 }
 
+// The frames need not be there yet.
+TEST_F(SessionLayout, FindsTheRepeatOfALightThatIsRawAndOfOneExposure) {
+  Session session = FourLightSession();
+  EXPECT_FALSE((Write(session), PlanSession(dir_, {}).value().repeated));
+  SessionFrame again = session.frames[1];
+  again.role = FrameRole::kRepeat;
+  again.file = "frames/again.exr";
+  session.frames.push_back(again);
+  EXPECT_FALSE((Write(session), PlanSession(dir_, {}).value().repeated));
+  session.frames[1].file = "frames/west.dng";
+  session.frames.back().file = "frames/again.dng";
+  fs::create_directories(dir_);
+  WriteText(dir_ / "session.json", SessionToJson(session));
+  const CapturePlan plan = PlanSession(dir_, {}).value();
+  ASSERT_TRUE(plan.repeated);
+  EXPECT_EQ(plan.repeated->first.path, dir_ / "frames/west.dng");
+  EXPECT_EQ(plan.repeated->again.path, dir_ / "frames/again.dng");
+  for (SessionFrame& frame : session.frames) {
+    frame.exposure_s = frame.role == FrameRole::kRepeat ? 0.5 : 1.0;
+  }
+  WriteText(dir_ / "session.json", SessionToJson(session));
+  EXPECT_FALSE(PlanSession(dir_, {}).value().repeated);
+}
+
 TEST_F(SessionLayout, DividesByExposureBeforeTheDarkFrameIsSubtracted) {
   Session session = FourLightSession();
   for (SessionFrame& frame : session.frames) {
