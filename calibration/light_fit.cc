@@ -17,15 +17,35 @@ constexpr double kExplained = 1.1;  // times the noise
 constexpr double kStartAnisotropy = 1.0;
 constexpr double kStartRoughness = 100.0;  // of a field
 
+Eigen::Vector3d MiddleOf(const std::vector<SheetSample>& samples) {
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+  for (const SheetSample& sample : samples) {
+    middle += sample.point_mm / static_cast<double>(samples.size());
+  }
+  return middle;
+}
+
+// Relative, of what a light sends to a point: d ln e = d ln phi - 2 l . ds / d. What position and flux owe to
+// each other, which a flat sheet hardly tells apart, is in the covariance of a fit.
+double IrradianceSd(const Eigen::MatrixXd& covariance, const Eigen::Vector3d& position_mm,
+                    const Eigen::Vector3d& point_mm) {
+  const Eigen::Vector3d d = position_mm - point_mm;
+  Eigen::VectorXd gradient = Eigen::VectorXd::Zero(covariance.rows());
+  gradient.head<3>() = -2.0 * d / d.squaredNorm();
+  double variance = 0.0;
+  for (Eigen::Index c = 1; c <= 3; ++c) {
+    Eigen::VectorXd of_channel = gradient;
+    of_channel[covariance.rows() - c] += 1.0;
+    variance += of_channel.dot(covariance * of_channel) / 3.0;
+  }
+  return std::sqrt(variance);
+}
+
 // A rough light on a higher rung than it has: an LED that faces the middle of the samples.
 Light OnRung(const Light& rough, LightModel model, const std::vector<SheetSample>& samples) {
   Light light = rough;
   if (IsLed(model) && !IsLed(rough.model)) {
-    Eigen::Vector3d middle = Eigen::Vector3d::Zero();
-    for (const SheetSample& sample : samples) {
-      middle += sample.point_mm / static_cast<double>(samples.size());
-    }
-    light.axis = (middle - rough.position_mm).normalized();
+    light.axis = (MiddleOf(samples) - rough.position_mm).normalized();
     light.anisotropy = kStartAnisotropy;
   }
   light.model = std::min(model, LightModel::kLed);
@@ -185,7 +205,8 @@ Status FitToAll(const LightResiduals& residuals, const RungFit& best, const Ligh
   result.direction_sd_rad = WorstDirectionSd(residuals.Samples(), result.light.position_mm,
                                              covariance.topLeftCorner<3, 3>());
   result.light.position_sd_mm = result.position_sd_mm;
-  result.light.flux_sd = std::sqrt(result.flux_sd.squaredNorm() / 3.0);
+  result.light.irradiance_sd =
+      IrradianceSd(covariance, result.light.position_mm, MiddleOf(residuals.Samples()));
   return {};
 }
 

@@ -131,6 +131,7 @@ Result<SphereLight> LightFromRays(const std::vector<SphereRay>& rays, bool has_c
     return std::sqrt(squares / static_cast<double>(rays.size()));
   };
   result.residual_rad = residual([&](const SphereRay&) { return result.light.direction; });
+  result.light.direction_sd_deg = std::max(options.ray_sd_rad, result.residual_rad) / kRadPerDeg;
   const std::optional<RayMeeting> meeting =
       has_camera && rays.size() > 1 ? MeetingOf(rays) : std::nullopt;
   if (meeting) {

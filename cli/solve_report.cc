@@ -197,9 +197,11 @@ std::string TextReport(const SolveArgs& args, const SolveOutcome& outcome) {
                         noise->gain_dn, noise->read_dn);
   }
   if (outcome.capture.mosaics && args.robust != "none" && !summary.noise_known) {
-    text += fmt::format(
-        "noise by the residuals: {:.2g} DN an electron; sateen calibrate response measures it\n",
-        summary.noise_scale * summary.noise_scale);
+    text += summary.noise_scale > 0.0
+                ? fmt::format("noise by residuals and neighbours: {:.2g} DN an electron",
+                              summary.noise_scale * summary.noise_scale)
+                : "nothing tells of the noise: uncertainty is 180 degrees";
+    text += "; sateen calibrate response measures it\n";
   }
   if (const std::string words = UnsolvedWords(summary); !words.empty()) {
     text += fmt::format("unsolved: {} (see reason.png)\n", words);

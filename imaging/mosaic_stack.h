@@ -11,6 +11,9 @@
 
 namespace sateen {
 
+// Standard deviation of rounding to whole readings.
+inline constexpr double kRoundingDn = 0.28867513459481287;
+
 // Place in the 2x2 pattern of a mosaic: x % 2 + 2 (y % 2).
 using BySite = std::array<float, 4>;
 

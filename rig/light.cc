@@ -67,8 +67,8 @@ Status Light::Validate(std::string_view what) const {
     return Fail(ErrorCode::kBadData, "{}: direction_sd_deg {:.6g}; need 0 to 90", what,
                 *direction_sd_deg);
   }
-  if (flux_sd && !(*flux_sd >= 0.0 && *flux_sd <= 1.0)) {
-    return Fail(ErrorCode::kBadData, "{}: flux_sd {:.6g}; need 0 to 1", what, *flux_sd);
+  if (irradiance_sd && !(*irradiance_sd >= 0.0 && *irradiance_sd <= 1.0)) {
+    return Fail(ErrorCode::kBadData, "{}: irradiance_sd {:.6g}; need 0 to 1", what, *irradiance_sd);
   }
   return {};
 }

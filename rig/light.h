@@ -35,10 +35,11 @@ struct Light {
   // kDistant: irradiance; otherwise the irradiance at 1 m on the axis. Red, green, blue; > 0.
   Eigen::Vector3d flux_rgb = Eigen::Vector3d::Ones();
   // Standard deviations, where a calibration found them: along the table's axes (kNear and above); of
-  // the angle to the true direction (kDistant), root mean square; of flux_rgb, relative. All >= 0.
+  // the angle to the true direction (kDistant), root mean square; of the irradiance in the middle of the
+  // table, relative, whatever flux and position owe to each other. All >= 0.
   std::optional<Eigen::Vector3d> position_sd_mm;
   std::optional<double> direction_sd_deg;
-  std::optional<double> flux_sd;
+  std::optional<double> irradiance_sd;
 
   // Names the first field that is out of range, with its value and its range. `what` names the
   // light in the message ("lights.txt: light 3").

@@ -90,7 +90,7 @@ Result<Light> ReadLight(JsonReader reader, const std::string& what) {
     light.field = *std::move(field);
   }
   light.flux_rgb = Vector3(reader.Numbers("flux_rgb", 3));
-  light.flux_sd = reader.OptionalNumber("flux_sd");
+  light.irradiance_sd = reader.OptionalNumber("irradiance_sd");
   if (Status status = reader.Finish().and_then([&] { return light.Validate(what); }); !status) {
     return tl::unexpected(status.error());
   }
@@ -127,8 +127,8 @@ nlohmann::ordered_json ToJson(const Light& light) {
                      {"gain", light.field.gain}};
   }
   json["flux_rgb"] = ToJson(light.flux_rgb);
-  if (light.flux_sd) {
-    json["flux_sd"] = *light.flux_sd;
+  if (light.irradiance_sd) {
+    json["irradiance_sd"] = *light.irradiance_sd;
   }
   return json;
 }

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cerrno>
+#include <cmath>
 #include <cstdlib>
 #include <system_error>
 #include <utility>
@@ -152,7 +153,7 @@ Result<MosaicFrame> FrameOf(const FrameFile& file, const RawReadings& readings,
     }
     if (noise) {
       frame.gain_dn = noise->gain_dn;
-      frame.read_dn = noise->read_dn;
+      frame.read_dn = std::hypot(noise->read_dn, kRoundingDn);
     }
     return frame;
   });

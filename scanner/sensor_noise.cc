@@ -24,6 +24,9 @@ constexpr size_t kTilesOfGroup = 4;     // at least
 constexpr double kHighestShare = 0.9;   // of the white level, up to which readings are linear
 // Times the variance that noise has by what most groups say.
 constexpr double kMovedVariance = 1.5;
+// Standard deviations by which the groups lie off a line of gain and read noise: a picture that moved as a
+// whole by 0.2 pixels is off by 3, noise by 1.
+constexpr double kMostMisfit = 2.0;
 // A median says as much as the mean of this share of the values.
 constexpr double kMedianWorth = 0.64;
 
@@ -152,8 +155,8 @@ Result<std::vector<TransferPoint>> PointsOf(const FrameFile& first, const FrameF
   return read.map([&] { return std::move(points); });
 }
 
-Result<SensorNoise> MeasureNoise(const RepeatedLight& repeated,
-                                 const std::vector<FrameFile>& dark) {
+Result<SensorNoise> MeasureNoise(const RepeatedLight& repeated, const std::vector<FrameFile>& dark,
+                                 const Task& task) {
   const Result<std::string> hash = CheckedHash(repeated.again);
   if (!hash) {
     return tl::unexpected(hash.error());
@@ -161,8 +164,8 @@ Result<SensorNoise> MeasureNoise(const RepeatedLight& repeated,
   const bool has_dark_pair = dark.size() >= 2 && dark.front().exposure == dark.back().exposure;
   std::future<Result<std::vector<TransferPoint>>> of_dark;
   if (has_dark_pair) {
-    of_dark =
-        std::async(std::launch::async, [&] { return PointsOf(dark.front(), dark.back(), true); });
+    of_dark = std::async(task.ThreadCount() > 1 ? std::launch::async : std::launch::deferred,
+                         [&] { return PointsOf(dark.front(), dark.back(), true); });
   }
   Result<std::vector<TransferPoint>> points = PointsOf(repeated.first, repeated.again, false);
   const Result<std::vector<TransferPoint>> dark_points =
@@ -171,9 +174,14 @@ Result<SensorNoise> MeasureNoise(const RepeatedLight& repeated,
     return tl::unexpected(points ? dark_points.error() : points.error());
   }
   points->insert(points->end(), dark_points->begin(), dark_points->end());
-  LeaveOutWhatMoved(*points);
+  if (has_dark_pair) {
+    LeaveOutWhatMoved(*points);
+  }
   return FitPhotonTransfer(*std::move(points), has_dark_pair)
-      .map([&](const PhotonTransfer& transfer) {
+      .and_then([&](const PhotonTransfer& transfer) -> Result<SensorNoise> {
+        if (transfer.misfit > kMostMisfit) {
+          return Fail(ErrorCode::kDegenerate, "the pair differs by more than noise");
+        }
         return SensorNoise{.gain_dn = transfer.gain_dn_per_electron,
                            .read_dn = transfer.read_noise_dn,
                            .source = repeated.again.path.string(),
@@ -183,7 +191,7 @@ Result<SensorNoise> MeasureNoise(const RepeatedLight& repeated,
 
 }  // namespace
 
-Result<std::optional<SensorNoise>> FindSensorNoise(const CapturePlan& plan) {
+Result<std::optional<SensorNoise>> FindSensorNoise(const CapturePlan& plan, const Task& task) {
   const std::optional<Response>& response = plan.rig.response;
   if (response && response->gain_dn_per_electron && response->read_noise_dn) {
     return SensorNoise{.gain_dn = *response->gain_dn_per_electron,
@@ -193,7 +201,7 @@ Result<std::optional<SensorNoise>> FindSensorNoise(const CapturePlan& plan) {
   if (!plan.repeated) {
     return std::nullopt;
   }
-  const Result<SensorNoise> measured = MeasureNoise(*plan.repeated, plan.dark);
+  const Result<SensorNoise> measured = MeasureNoise(*plan.repeated, plan.dark, task);
   if (!measured && measured.error().code != ErrorCode::kDegenerate) {
     return tl::unexpected(measured.error());
   }

@@ -5,11 +5,12 @@
 #include <string>
 
 #include "core/error.h"
+#include "core/task.h"
 #include "scanner/capture_plan.h"
 
 namespace sateen {
 
-// Of a reading [DN]: variance = gain_dn (reading - black) + read_dn^2.
+// Of a reading [DN]: variance = gain_dn (reading - black) + read_dn^2 + 1/12, the last of rounding.
 struct SensorNoise {
   double gain_dn = 0.0;
   double read_dn = 0.0;
@@ -27,9 +28,10 @@ struct SensorNoise {
 /// as much variance again as most: a part of the picture that moved does no harm. Readings are those of the sensor's integers, whatever exposure and balance.
 ///
 /// Returns  nothing where neither the rig nor a repeat tells, or the pair shows no noise that grows with
-///          the brightness, as that of a simulation may not
+///          the brightness, as that of a simulation may not, or more than noise, as where the cloth moved
 /// Errors   as TakeRawReadings()
 /// Cost     decodes two pairs of frames, and looks at 64 rows of tiles at most
-[[nodiscard]] Result<std::optional<SensorNoise>> FindSensorNoise(const CapturePlan& plan);
+[[nodiscard]] Result<std::optional<SensorNoise>> FindSensorNoise(const CapturePlan& plan,
+                                                                 const Task& task = {});
 
 }  // namespace sateen

@@ -242,10 +242,13 @@ Status ReadFrames(const CapturePlan& plan, const ReadCaptureOptions& options, co
   if (options.domain != Domain::kRgb && !why_not) {
     Result<std::optional<SensorNoise>> noise;
     if (options.by_noise) {
-      noise = FindSensorNoise(plan);
+      noise = FindSensorNoise(plan, task);
     }
     if (!noise) {
-      return tl::unexpected(noise.error());
+      // No frame that is solved depends on it.
+      capture.warnings.push_back("the noise is not measured on the repeat: " +
+                                 noise.error().message);
+      noise = std::nullopt;
     }
     return LoadMosaics(plan, *noise, options.scratch_dir, task).map([&](LoadedMosaics mosaics) {
       capture.sha256_of_input = mosaics.sha256_of_input;

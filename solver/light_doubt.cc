@@ -18,15 +18,14 @@ struct LightErrors {
 
 // (2)
 LightErrors ErrorsOf(const Light& light, const Eigen::Vector3d& x_mm) {
-  const double flux = light.flux_sd.value_or(0.0);
-  LightErrors errors{.irradiance = flux * flux};
+  LightErrors errors{.irradiance = std::pow(light.irradiance_sd.value_or(0.0), 2.0)};
   if (light.model == LightModel::kDistant) {
     // Along two axes, of which one angle to the truth is made.
     errors.direction = std::pow(light.direction_sd_deg.value_or(0.0) * kRadPerDeg, 2.0) / 2.0;
   } else if (light.position_sd_mm) {
-    const double d_squared = (light.position_mm - x_mm).squaredNorm();
-    errors.direction = light.position_sd_mm->squaredNorm() / 3.0 / d_squared;
-    errors.irradiance += 4.0 * errors.direction;
+    const Eigen::Vector3d to_light = light.position_mm - x_mm;
+    const double along = light.position_sd_mm->cwiseProduct(to_light.normalized()).squaredNorm();
+    errors.direction = (light.position_sd_mm->squaredNorm() - along) / 2.0 / to_light.squaredNorm();
   }
   return errors;
 }
@@ -60,7 +59,7 @@ Eigen::Vector3d PlaceOf(const Rig& rig, double column, double row) {
 
 std::optional<LightDoubt> LightDoubt::Make(const Rig& rig, ImageSize size) {
   if (std::ranges::none_of(rig.lights, [](const Light& light) {
-        return light.position_sd_mm || light.direction_sd_deg || light.flux_sd;
+        return light.position_sd_mm || light.direction_sd_deg || light.irradiance_sd;
       })) {
     return std::nullopt;
   }

@@ -26,7 +26,6 @@ using Clock = std::chrono::steady_clock;
 constexpr size_t kFewestLights = 3;
 // Of a thread at a time: with the row more that is read on either side, few rows would be read twice.
 constexpr int kMosaicRowsPerPiece = 8;
-constexpr double kRoundingDn = 0.2887;  // standard deviation of rounding to whole readings
 
 double SecondsFrom(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
@@ -182,7 +181,8 @@ SolveSummary SummaryOf(const PieceSummary& total, const MosaicJob& job, bool is_
   if (job.options.mode) {
     ReportRungs(total, summary);
     summary.noise_known = is_noise_known;
-    summary.noise_scale = is_noise_known ? 1.0 : std::sqrt(job.stack.lit[0].gain_dn);
+    const double gain = job.stack.lit[0].gain_dn;
+    summary.noise_scale = is_noise_known ? 1.0 : gain < kUnknownGain ? std::sqrt(gain) : 0.0;
   }
   if (job.sheen) {
     summary.sheen_alpha = job.sheen->alpha;

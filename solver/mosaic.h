@@ -53,8 +53,7 @@ using BandSink = std::function<Status(int first_row, const NormalField& band)>;
 /// rig      K lights in the order of the frames; the camera, where a light is not distant
 /// mask     H x W or nothing
 /// Returns  H x W, as SolveLadder; without `mode` as SolveLambertian. `residual` is of the own colour
-/// Errors   as SolveLambertian; kBadData where nothing tells a ladder of the noise, or the mosaic is
-///          narrower than 64 sites; kIo where rows cannot be read; what the sink returns
+/// Errors   as SolveLambertian; kBadData where the mosaic is narrower than 64 sites; kIo where rows cannot be read; what the sink returns
 /// Cost     O(H W K): nine tenths of what the same solve of interpolated colours takes, and the
 ///          interpolating is saved; the same bits for any number of threads and any band_rows
 [[nodiscard]] Result<NormalField> SolveMosaic(const MosaicStack& stack, const Rig& rig,

@@ -115,7 +115,9 @@ std::vector<int> RowsLookedAt(const MosaicStack& stack, const Mask* mask) {
   }
   std::vector<int> rows(std::min(kRowsLookedAt, inside.size()));
   for (size_t j = 0; j < rows.size(); ++j) {
-    rows[j] = inside[(2 * j + 1) * inside.size() / (2 * rows.size())];
+    // Of both parities, which have other colours.
+    const size_t at = (2 * j + 1) * inside.size() / (2 * rows.size());
+    rows[j] = inside[std::min(at / 2 * 2 + j % 2, inside.size() - 1)];
   }
   return rows;
 }

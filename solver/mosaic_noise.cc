@@ -25,6 +25,7 @@ struct RowTells {
   bool is_read = true;
   std::array<std::vector<float>, 256> misfits;  // by usable readings
   std::vector<float> bends;                     // b^2 / 6 signal
+  double excess = 0.0;                          // sum of (b^2 - 6/12) / 6 signal
 };
 
 // (3) of one row and frame.
@@ -46,6 +47,7 @@ void AddBends(const MosaicFrame& frame, const MosaicPiece& piece, size_t k,
         signal > kLeastSignal * (frame.saturated_dn - black)) {
       const float bend = before - 2.0F * here + after;
       tells.bends.push_back(bend * bend / (6.0F * signal));
+      tells.excess += static_cast<double>((bend * bend - 0.5F) / (6.0F * signal));
     }
   }
 }
@@ -91,6 +93,7 @@ double GainOfRows(std::vector<RowTells>& rows) {
   RowTells all;
   for (const RowTells& row : rows) {
     all.bends.insert(all.bends.end(), row.bends.begin(), row.bends.end());
+    all.excess += row.excess;
     for (size_t samples = kFewestReadings; samples < all.misfits.size(); ++samples) {
       all.misfits[samples].insert(all.misfits[samples].end(), row.misfits[samples].begin(),
                                   row.misfits[samples].end());
@@ -98,8 +101,11 @@ double GainOfRows(std::vector<RowTells>& rows) {
   }
   const auto usual = std::ranges::max_element(all.misfits, {}, &std::vector<float>::size);
   const auto freedom = static_cast<int>(usual - all.misfits.begin()) - 3;
-  return std::min(GainOf(*usual, kBestMisfits, std::max(1, freedom)),
-                  GainOf(all.bends, kBestBends, 1));
+  double of_bends = GainOf(all.bends, kBestBends, 1);
+  if (of_bends == 0.0) {
+    of_bends = std::max(0.0, all.excess / static_cast<double>(all.bends.size()));
+  }
+  return std::min({GainOf(*usual, kBestMisfits, std::max(1, freedom)), of_bends, kUnknownGain});
 }
 
 }  // namespace
@@ -110,6 +116,7 @@ Result<double> MeasureGain(const MosaicStack& stack, const Rig& rig,
   MosaicStack unit = stack;
   for (MosaicFrame& frame : unit.lit) {
     frame.gain_dn = 1.0;
+    frame.read_dn = kRoundingDn;
   }
   const Result<MosaicFeed> feed = MosaicFeed::Make(unit, rig, options, /*weighted=*/true);
   if (!feed) {
@@ -129,15 +136,7 @@ Result<double> MeasureGain(const MosaicStack& stack, const Rig& rig,
   if (!std::ranges::all_of(rows, &RowTells::is_read)) {
     return tl::unexpected(CannotReadBack(stack));
   }
-  const double gain = GainOfRows(rows);
-  if (!std::isfinite(gain)) {
-    return Fail(ErrorCode::kBadData,
-                "{}: nothing tells of the noise, by which mosaics are weighted; need the sensor's "
-                "gain and read noise in the rig (sateen calibrate response), or more lights, or "
-                "solve without weights or from interpolated colours",
-                stack.lit[0].name);
-  }
-  return gain;
+  return GainOfRows(rows);
 }
 
 }  // namespace sateen

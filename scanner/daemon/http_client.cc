@@ -54,10 +54,12 @@ bool Accepts(const std::filesystem::path& path) {
     return false;
   }
   std::memcpy(address.sun_path, path.c_str(), path.native().size() + 1);
-  const int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  // Without waiting: EAGAIN is a daemon that is there and has not come to this one yet.
+  const int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
   const bool connected =
       fd >= 0 &&
-      connect(fd, static_cast<sockaddr*>(static_cast<void*>(&address)), sizeof address) == 0;
+      (connect(fd, static_cast<sockaddr*>(static_cast<void*>(&address)), sizeof address) == 0 ||
+       errno == EAGAIN);
   if (fd >= 0) {
     close(fd);
   }

@@ -61,6 +61,27 @@ TEST(FitLight, OneFlatSheetGivesDirections) {
   EXPECT_EQ(fit.light.name, truth.name);
 }
 
+// A flat sheet hardly tells height from flux, and well what the two together send to the table.
+TEST(FitLight, SaysHowWellTheIrradianceIsKnown) {
+  const Light truth = TrueLight(LightModel::kNear);
+  constexpr int kFits = 24;
+  double squares = 0.0;
+  double predicted = 0.0;
+  double flux_squared = 0.0;
+  for (uint64_t seed = 0; seed < kFits; ++seed) {
+    const std::vector<SheetSample> samples = SamplesOf(FullCamera(), truth, 1, 100 + seed);
+    const LightFit fit = FitLight(samples, RoughLight(truth, 15.0, 200 + seed)).value();
+    const Eigen::Vector3d ratio =
+        IncidentAt(fit.light, Eigen::Vector3d::Zero())
+            .e_rgb.cwiseQuotient(IncidentAt(truth, Eigen::Vector3d::Zero()).e_rgb);
+    squares += (ratio - Eigen::Vector3d::Ones()).squaredNorm() / 3.0;
+    predicted += std::pow(fit.light.irradiance_sd.value(), 2.0);
+    flux_squared += fit.flux_sd.squaredNorm() / 3.0;
+  }
+  EXPECT_NEAR(std::sqrt(squares / predicted), 1.0, 0.35);
+  EXPECT_LT(predicted, 0.25 * flux_squared);
+}
+
 TEST(FitLight, AFlatSheetAndFourTiltsGivePositionAndFlux) {
   for (const double anisotropy : {0.0, 1.5}) {
     const LightModel model = anisotropy > 0.0 ? LightModel::kLed : LightModel::kNear;

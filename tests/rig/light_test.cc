@@ -118,8 +118,8 @@ TEST(Light, ValidateNamesTheFieldOutOfRange) {
               HasSubstr("position_sd_mm [1, -1, 1]; need three finite numbers >= 0"));
   EXPECT_THAT(message(LightModel::kDistant, [](Light& l) { l.direction_sd_deg = 91; }),
               HasSubstr("direction_sd_deg 91; need 0 to 90"));
-  EXPECT_THAT(message(LightModel::kDistant, [&](Light& l) { l.flux_sd = infinity; }),
-              HasSubstr("flux_sd inf; need 0 to 1"));
+  EXPECT_THAT(message(LightModel::kDistant, [&](Light& l) { l.irradiance_sd = infinity; }),
+              HasSubstr("irradiance_sd inf; need 0 to 1"));
 }
 
 TEST(Light, ValidateLooksAtTheFieldsOfTheModelOnly) {

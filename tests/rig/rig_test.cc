@@ -28,7 +28,7 @@ Json FullRig() {
                  "read_noise_dn": 3.2, "gain_dn_per_electron": 0.4},
     "lights": [
       {"name": "a", "channel": 0, "model": "distant", "direction": [0.6, 0, 0.8],
-       "direction_sd_deg": 0.4, "flux_rgb": [1, 1.1, 0.9], "flux_sd": 0.01},
+       "direction_sd_deg": 0.4, "flux_rgb": [1, 1.1, 0.9], "irradiance_sd": 0.01},
       {"name": "b", "channel": 5, "model": "near", "position_mm": [100, -20, 350.5],
        "position_sd_mm": [0.1, 0.2, 0.3], "flux_rgb": [1, 2, 3]},
       {"name": "c", "channel": 2, "model": "led", "position_mm": [100, 20, 350],
@@ -103,9 +103,9 @@ TEST(ReadRig, ReadsALightOfEachModel) {
   EXPECT_EQ(lights[1].channel, 5);
   EXPECT_EQ(lights[1].position_mm, Eigen::Vector3d(100, -20, 350.5));
   EXPECT_EQ(lights[0].direction_sd_deg, 0.4);
-  EXPECT_EQ(lights[0].flux_sd, 0.01);
+  EXPECT_EQ(lights[0].irradiance_sd, 0.01);
   EXPECT_EQ(lights[1].position_sd_mm, Eigen::Vector3d(0.1, 0.2, 0.3));
-  EXPECT_FALSE(lights[1].direction_sd_deg || lights[1].flux_sd || lights[0].position_sd_mm);
+  EXPECT_FALSE(lights[1].direction_sd_deg || lights[1].irradiance_sd || lights[0].position_sd_mm);
   EXPECT_EQ(lights[2].model, LightModel::kLed);
   EXPECT_EQ(lights[2].axis, Eigen::Vector3d(0, -0.6, -0.8));
   EXPECT_EQ(lights[2].anisotropy, 0.7);
@@ -174,7 +174,7 @@ TEST(ReadRig, LightsMustBeAboveTheTable) {
 TEST(ReadRig, OnlyTheKeysOfTheModelAreAllowed) {
   EXPECT_EQ(MessageWith("/lights/0/position_mm", {0, 0, 1}),
             "rig.json: lights[0].position_mm is not known here; the keys are channel, direction, "
-            "direction_sd_deg, flux_rgb, flux_sd, model, name");
+            "direction_sd_deg, flux_rgb, irradiance_sd, model, name");
   EXPECT_THAT(MessageWith("/lights/1/axis", {0, 0, -1}), HasSubstr("lights[1].axis is not known"));
   EXPECT_THAT(MessageWith("/lights/2/direction", {0, 0, 1}), HasSubstr("lights[2].direction is"));
   EXPECT_THAT(MessageWith("/lights/0/model", "spot"),

@@ -74,7 +74,7 @@ TEST_F(MosaicLoader, ReadingsAndTheirLevelsAreThoseOfTheFile) {
   EXPECT_NEAR(radiance, 2.0F * (1000.0F / 3900.0F) / 0.5F, 1e-5F);
   EXPECT_NEAR(frame.saturated_dn, 3900.0F, 0.01F);  // the response's white, below the file's
   EXPECT_EQ(frame.gain_dn, 0.25);
-  EXPECT_EQ(frame.read_dn, 3.0);
+  EXPECT_NEAR(frame.read_dn, std::sqrt(9.0 + 1.0 / 12.0), 1e-9);
   EXPECT_FLOAT_EQ(mosaics.stack.dark_weights[0], 0.2F);  // by the squares of 0.25 and 0.5
   EXPECT_FLOAT_EQ(mosaics.stack.dark_weights[1], 0.8F);
   EXPECT_EQ(mosaics.sha256_of_input.size(), 6U);

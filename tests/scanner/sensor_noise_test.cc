@@ -24,7 +24,8 @@ class SensorNoiseTest : public ::testing::Test {
  protected:
   struct Exposure {
     double brightness = 0.0;  // of the cloth; 0: dark
-    double right_px = 0.0;    // by which the right tenth has moved
+    double right_px = 0.0;    // by which a part has moved: from this share of the width on
+    double moved_from = 0.9;
     bool is_noisy = true;
   };
 
@@ -32,10 +33,10 @@ class SensorNoiseTest : public ::testing::Test {
     Image<uint16_t> mosaic(kSize);
     for (int y = 0; y < kSize.height; ++y) {
       for (int x = 0; x < kSize.width; ++x) {
-        const double at = x + (x > 9 * kSize.width / 10 ? exposure.right_px : 0.0);
-        // Up to 3,400 DN over a slope from left to right; 0.8 of it in every other stripe of 7 sites.
+        const double at = x + (x >= exposure.moved_from * kSize.width ? exposure.right_px : 0.0);
+        // Up to 3,400 DN over a slope from left to right; down to 0.8 of it in stripes of 7 sites.
         const double signal = exposure.brightness * (200.0 + 3200.0 * x / kSize.width) *
-                              (std::sin(2.0 * std::numbers::pi * at / 7.0) > 0.0 ? 1.0 : 0.8);
+                              (0.9 + 0.1 * std::sin(2.0 * std::numbers::pi * at / 7.0));
         std::normal_distribution<double> noise(0.0, std::sqrt(kGain * signal + kRead * kRead));
         const double dn = kBlack + signal + (exposure.is_noisy ? noise(random_) : 0.0);
         mosaic.At(x, y) = static_cast<uint16_t>(std::lround(std::max(dn, 0.0)));
@@ -72,6 +73,13 @@ TEST_F(SensorNoiseTest, ATenthOfThePictureThatMovedDoesNoHarm) {
   const std::optional<SensorNoise> noise = FindSensorNoise(plan).value();
   ASSERT_TRUE(noise);
   EXPECT_NEAR(noise->gain_dn, kGain, 0.03 * kGain);  // it is all of the brightest groups
+}
+
+// Half a pixel: what would be taken for noise is three times what there is.
+TEST_F(SensorNoiseTest, APictureThatMovedAsAWholeTellsNothing) {
+  const CapturePlan plan =
+      PlanOf({.brightness = 1.0}, {.brightness = 1.0, .right_px = 0.5, .moved_from = 0.0});
+  EXPECT_FALSE(FindSensorNoise(plan).value());
 }
 
 TEST_F(SensorNoiseTest, ADarkPairOfDifferentTimesIsNoPair) {

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Dense>
+#include <array>
 #include <cmath>
 
 #include "core/angle.h"
@@ -36,8 +38,10 @@ Light Disturbed(const Light& light, uint64_t rig, size_t k) {
                         .normalized();
   } else {
     off.position_mm += light.position_sd_mm->cwiseProduct(deviates);
+    // As a fit has it, what the table gets is known better than the distance.
+    off.flux_rgb *= off.position_mm.squaredNorm() / light.position_mm.squaredNorm();
   }
-  off.flux_rgb *= 1.0 + *light.flux_sd * NormalDeviate(rig, 7 * k + 3);
+  off.flux_rgb *= 1.0 + *light.irradiance_sd * NormalDeviate(rig, 7 * k + 3);
   return off;
 }
 
@@ -68,15 +72,15 @@ double ActualOverPredicted(const Rig& rig, const RenderedRelief& truth) {
 
 // `on_slopes`: of 30 degrees, where (3) knows only of lights and not of n.
 void ExpectHonest(const Rig& rig, double on_slopes) {
-  EXPECT_NEAR(ActualOverPredicted(rig, Render(rig, kSmall, 1.0)), 1.0, 0.04);
-  EXPECT_NEAR(ActualOverPredicted(rig, Render(rig, kSmall, 30.0)), on_slopes, 0.04);
+  EXPECT_NEAR(ActualOverPredicted(rig, Render(rig, kSmall, 1.0)), 1.0, 0.07);
+  EXPECT_NEAR(ActualOverPredicted(rig, Render(rig, kSmall, 30.0)), on_slopes, 0.05);
 }
 
 TEST(LightDoubt, IsTheActualErrorUnderDirectionsThatAreOff) {
   Rig rig = DistantRig(DistantRing(8, 40.0 * kRadPerDeg));
   for (Light& light : rig.lights) {
     light.direction_sd_deg = 0.5;
-    light.flux_sd = 0.001;
+    light.irradiance_sd = 0.001;
   }
   ExpectHonest(rig, 1.11);
 }
@@ -85,7 +89,7 @@ TEST(LightDoubt, IsTheActualErrorUnderFluxesThatAreOff) {
   Rig rig = DistantRig(DistantRing(8, 40.0 * kRadPerDeg));
   for (Light& light : rig.lights) {
     light.direction_sd_deg = 0.01;
-    light.flux_sd = 0.02;
+    light.irradiance_sd = 0.02;
   }
   ExpectHonest(rig, 0.92);
 }
@@ -94,9 +98,47 @@ TEST(LightDoubt, IsTheActualErrorUnderPositionsThatAreOff) {
   Rig rig = RingRig(kSmall, LightModel::kNear);
   for (Light& light : rig.lights) {
     light.position_sd_mm = {2.0, 2.0, 2.0};
-    light.flux_sd = 0.001;
+    light.irradiance_sd = 0.001;
   }
-  ExpectHonest(rig, 0.90);
+  ExpectHonest(rig, 1.15);
+}
+
+// Under one near light that is off, what its neighbourhood suffers: tiles are not mixed up.
+TEST(LightDoubt, EveryTileHasItsOwn) {
+  const ImageSize size{200, 130};
+  Rig rig = RingRig(size, LightModel::kNear);
+  rig.lights[0].irradiance_sd = 0.05;
+  rig.lights[3].position_sd_mm = {3.0, 0.0, 1.0};
+  const LightDoubt doubt = LightDoubt::Make(rig, size).value();
+  NormalField field;
+  field.Resize(size);
+  field.uncertainty = Image<float>(size);
+  for (size_t p = 0; p < size.PixelCount(); ++p) {
+    field.normal[2].pixels[p] = 1.0F;
+    field.reason.pixels[p] = static_cast<uint8_t>(Reason::kSolved);
+  }
+  for (int row = 0; row < size.height; ++row) {
+    doubt.AddToRow(row, field.reason.Index(0, row), field);
+  }
+  // Column and row of a pixel, and the middle of its tile.
+  for (const auto& [x, y, middle_x, middle_y] :
+       {std::array{10, 10, 32, 32}, {150, 10, 160, 32}, {199, 70, 199, 96}, {63, 129, 32, 129}}) {
+    const Eigen::Vector3d place = TablePointOfPixel(*rig.camera, middle_x, middle_y).value();
+    Eigen::MatrixX3d l(static_cast<Eigen::Index>(rig.lights.size()), 3);
+    for (size_t k = 0; k < rig.lights.size(); ++k) {
+      l.row(static_cast<Eigen::Index>(k)) = IncidentAt(rig.lights[k], place).l;
+    }
+    const Eigen::Matrix3Xd g = (l.transpose() * l).inverse() * l.transpose();
+    const double c0 = l(0, 2);
+    const double c3 = l(3, 2);
+    const double d3 = (rig.lights[3].position_mm - place).norm();
+    const double across = (10.0 - std::pow(3.0 * l(3, 0), 2) - std::pow(l(3, 2), 2)) / 2.0;
+    const double squared = g.col(0).head<2>().squaredNorm() * 0.05 * 0.05 * c0 * c0 +
+                           g.col(3).head<2>().squaredNorm() * across / (d3 * d3) * (1.0 - c3 * c3);
+    EXPECT_NEAR(static_cast<double>(field.uncertainty.At(x, y)), std::sqrt(squared) * kDegPerRad,
+                1e-4)
+        << x << ", " << y;
+  }
 }
 
 TEST(LightDoubt, ARigThatSaysNothingHasNone) {

@@ -10,6 +10,7 @@
 #include "simulation/random.h"
 #include "simulation/relief.h"
 #include "simulation/rigs.h"
+#include "solver/light_doubt.h"
 #include "tests/solver/solver_cases.h"
 
 namespace sateen {
@@ -398,20 +399,74 @@ TEST(MosaicTest, ShineIsNotTakenForNoise) {
   EXPECT_LT(field.summary.noise_scale, 2.0 * std::sqrt(kGainDn));
 }
 
+// Reasons are told where there is nothing to measure noise on.
+TEST(MosaicTest, ADarkCaptureOfUnknownNoiseIsDark) {
+  const Rig rig = DistantRig(DistantRing(5, 40.0 * kRadPerDeg));
+  Readings readings(Render(rig, kSize), rig);
+  for (Image<uint16_t>& frame : readings.frames) {
+    std::ranges::fill(frame.pixels, static_cast<uint16_t>(kBlackDn));
+  }
+  readings.ForgetNoise();
+  const NormalField field = readings.Solve(rig);
+  EXPECT_EQ(field.summary.dark, static_cast<int64_t>(kSize.PixelCount()));
+}
+
+// Readings of few whole numbers, whose neighbours mostly do not differ: 0.05 DN an electron.
+TEST(MosaicTest, NoiseBelowRoundingIsMeasured) {
+  const Rig rig = RingRig({256, 192}, LightModel::kNear);
+  Readings readings(Render(rig, {256, 192}), rig);
+  uint64_t counter = 0;
+  for (Image<uint16_t>& frame : readings.frames) {
+    for (uint16_t& reading : frame.pixels) {
+      const double signal = (static_cast<double>(reading) - kBlackDn) / 4000.0;  // 0 to 14 DN
+      reading = static_cast<uint16_t>(
+          std::lround(20.0 + signal + std::sqrt(0.02 * signal) * NormalDeviate(5, counter++)));
+    }
+  }
+  for (MosaicFrame& frame : readings.stack.lit) {
+    frame.per_dn.fill(frame.per_dn[0] * 4000.0F);
+    frame.at_zero.fill(-20.0F * frame.per_dn[0]);
+    frame.saturated_dn = 40.0F;
+  }
+  readings.ForgetNoise();
+  const NormalField field = readings.Solve(rig);
+  EXPECT_GT(field.summary.noise_scale, std::sqrt(0.01));
+  EXPECT_LT(field.summary.noise_scale, std::sqrt(0.06));
+}
+
+TEST(MosaicTest, LightsThatAreUncertainMakeNormalsUncertain) {
+  Rig rig = RingRig({96, 150}, LightModel::kNear);
+  Readings readings(Render(rig, {96, 150}), rig);
+  const NormalField sure = readings.Solve(rig, Ladder(LadderMode::kLeastSquares));
+  for (Light& light : rig.lights) {
+    light.irradiance_sd = 0.02;
+  }
+  MosaicOptions by_bands = Ladder(LadderMode::kLeastSquares);
+  by_bands.band_rows = 40;
+  const NormalField unsure = readings.Solve(rig, by_bands);
+  NormalField expected = sure;
+  const LightDoubt doubt = LightDoubt::Make(rig, {96, 150}).value();
+  for (const int row : {3, 70, 149}) {
+    doubt.AddToRow(row, sure.reason.Index(0, row), expected);
+    for (int x = 0; x < 96; ++x) {
+      ASSERT_FLOAT_EQ(unsure.uncertainty.At(x, row), expected.uncertainty.At(x, row));
+      ASSERT_GT(unsure.uncertainty.At(x, row), 0.3F);
+    }
+  }
+}
+
 TEST(MosaicTest, ThreeLightsAndNoNeighboursTellNothingOfTheNoise) {
   const Rig rig = DistantRig(DistantRing(3, 40.0 * kRadPerDeg));
   Readings readings(Render(rig, kSize), rig);
   readings.ForgetNoise();
-  const MosaicsInMemory rows(readings.frames);
-  readings.stack.rows = &rows;
   Mask mask(kSize);
   for (int y = 0; y < kSize.height; ++y) {
     mask.At(40, y) = 255;
   }
-  const Result<NormalField> field = SolveMosaic(readings.stack, rig, mask);
-  ASSERT_FALSE(field);
-  EXPECT_THAT(field.error().message, ::testing::HasSubstr("nothing tells of the noise"));
-  EXPECT_TRUE(SolveMosaic(readings.stack, rig, mask, Plain()));
+  const NormalField field = readings.Solve(rig, {}, 0, mask);
+  EXPECT_EQ(field.summary.solved, kSize.height);
+  EXPECT_EQ(field.summary.noise_scale, 0.0);
+  EXPECT_EQ(field.uncertainty.At(40, 9), 180.0F);
 }
 
 TEST(MosaicTest, WhatCannotBeSolvedIsRefusedInWords) {
