@@ -20,6 +20,8 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
+constexpr auto kQuarterSquareDegree = static_cast<float>(0.25 * kDegPerRad * kDegPerRad);
+
 constexpr std::array<std::pair<LadderMode, std::string_view>, 3> kModeNames = {{
     {LadderMode::kAuto, "auto"},
     {LadderMode::kLeastSquares, "least-squares"},
@@ -54,9 +56,10 @@ Status DoubtLeastSquares(const Doubt& doubt, const Task& task, NormalField& fiel
   return status;
 }
 
-// |n(-1) - 2 n + n(+1)| of neighbours `step` apart; one that is unsolved or beyond the border is as far
+// |n(-1) - 2 n + n(+1)|^2 of neighbours `step` apart; one that is unsolved or beyond the border is as far
 // from n as the other.
-float BendAt(const NormalField& field, size_t p, size_t step, bool has_before, bool has_after) {
+float SquaredBendAt(const NormalField& field, size_t p, size_t step, bool has_before,
+                    bool has_after) {
   const auto normal_at = [&](size_t q) {
     return Eigen::Vector3f(field.normal[0].pixels[q], field.normal[1].pixels[q],
                            field.normal[2].pixels[q]);
@@ -65,10 +68,10 @@ float BendAt(const NormalField& field, size_t p, size_t step, bool has_before, b
   const bool after = has_after && IsSolved(field, p + step);
   const Eigen::Vector3f n = normal_at(p);
   if (before && after) {
-    return (normal_at(p - step) - 2.0F * n + normal_at(p + step)).norm();
+    return (normal_at(p - step) - 2.0F * n + normal_at(p + step)).squaredNorm();
   }
-  return before  ? 2.0F * (normal_at(p - step) - n).norm()
-         : after ? 2.0F * (normal_at(p + step) - n).norm()
+  return before  ? 4.0F * (normal_at(p - step) - n).squaredNorm()
+         : after ? 4.0F * (normal_at(p + step) - n).squaredNorm()
                  : 0.0F;
 }
 
@@ -86,11 +89,11 @@ Status DoubtInterpolation(const Task& task, NormalField& field, PieceSummary& to
         if (!IsSolved(field, p)) {
           continue;
         }
-        const float bend = std::hypot(BendAt(field, p, 1, x > 0, x + 1 < width),
-                                      BendAt(field, p, width, row > 0, row + 1 < size.height));
+        const float bend_squared = SquaredBendAt(field, p, 1, x > 0, x + 1 < width) +
+                                   SquaredBendAt(field, p, width, row > 0, row + 1 < size.height);
         float& uncertainty = field.uncertainty.pixels[p];
-        uncertainty =
-            std::min(180.0F, std::hypot(uncertainty, 0.5F * bend * static_cast<float>(kDegPerRad)));
+        uncertainty = std::min(
+            180.0F, std::sqrt(uncertainty * uncertainty + kQuarterSquareDegree * bend_squared));
         const auto rung = static_cast<Rung>(field.model.pixels[p]);
         double& sum = rung <= Rung::kUnchecked ? sums.least_squares_deg
                       : rung == Rung::kSheen   ? sums.sheen_deg
