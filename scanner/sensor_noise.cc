@@ -17,7 +17,8 @@ namespace {
 
 constexpr int kTileWidth = 32;  // sites; even, as the pattern of colours is
 constexpr int kTileHeight = 16;
-constexpr int kTileRows = 64;           // that are looked at
+constexpr size_t kSitesOfTile = kTileWidth * kTileHeight / 4;  // of one place in the 2x2 pattern
+constexpr int kTileRows = 64;                                  // that are looked at
 constexpr double kLeastTexture = 1e-9;  // of the sum's squares, below which there is no slope
 constexpr size_t kGroups = 16;          // of about equally bright tiles of a colour
 constexpr size_t kTilesOfGroup = 4;     // at least
@@ -105,7 +106,7 @@ void AddGroups(std::vector<TileNoise> tiles, size_t colour, bool is_dark,
     const auto middle = group.begin() + static_cast<std::ptrdiff_t>(group.size() / 2);
     const double mean = middle->mean_dn;
     std::ranges::nth_element(group, middle, {}, &TileNoise::variance_dn2);
-    const auto sites = static_cast<double>(kTileWidth * kTileHeight / 4 * group.size());
+    const auto sites = static_cast<double>(kSitesOfTile * group.size());
     points.push_back({.mean_dn = is_dark ? 0.0 : mean,
                       .variance_dn2 = middle->variance_dn2,
                       .count = kMedianWorth * sites,
