@@ -24,8 +24,9 @@ struct SensorNoise {
 ///     variance = 1/2 var(a - b - beta (a + b)),  beta by least squares in the tile            (1)
 ///
 /// so that neither the cloth nor a drifting light is in it. The medians of tiles that are about equally
-/// bright go to FitPhotonTransfer() of calibration/photon_transfer.h, but for those that hold half
-/// as much variance again as most: a part of the picture that moved does no harm. Readings are those of the sensor's integers, whatever exposure and balance.
+/// bright go to FitPhotonTransfer() of calibration/photon_transfer.h, but, with a
+/// dark pair, for those that hold half as much variance again as most: a part of the picture that moved
+/// does no harm.
 ///
 /// Returns  nothing where neither the rig nor a repeat tells, or the pair shows no noise that grows with
 ///          the brightness, as that of a simulation may not, or more than noise, as where the cloth moved

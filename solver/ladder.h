@@ -95,7 +95,7 @@ struct LadderOptions {
 ///     uncertainty <- hypot(uncertainty, b / 2),  b^2 = |n(x-1) - 2 n + n(x+1)|^2 + the same in y  (16)
 ///
 /// stack, rig, mask, errors   as SolveLambertian
-/// Cost     rung 1 about 1.6 times SolveLambertian; rung 2 O(K^2 + K 10^3) a pixel; rung 3 some
+/// Cost     rung 1 about 1.5 times SolveLambertian; rung 2 O(K^2 + K 10^3) a pixel; rung 3 some
 ///          microseconds a pixel and 0.1 s to find; the same bits for any number of threads
 /// Source   the search over triples is exhaustive RANSAC (Fischler and Bolles 1981) with the cost of
 ///          sparse regression (log-sum: Candes, Wakin and Boyd 2008); the band is position

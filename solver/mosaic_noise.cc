@@ -82,10 +82,7 @@ double GainOf(std::vector<float>& values, double share, int freedom) {
   if (values.empty()) {
     return std::numeric_limits<double>::infinity();
   }
-  const auto place =
-      values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
-  std::ranges::nth_element(values, place);
-  return static_cast<double>(*place) / ChiSquaredQuantile(share, freedom);
+  return static_cast<double>(QuantileOf(values, share)) / ChiSquaredQuantile(share, freedom);
 }
 
 // (1)

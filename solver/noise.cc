@@ -47,6 +47,13 @@ std::optional<StackNoise> NoiseOf(const LightStack& stack, const Rig& rig) {
   return noise;
 }
 
+float QuantileOf(std::vector<float>& values, double share) {
+  const auto place =
+      values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
+  std::ranges::nth_element(values, place);
+  return *place;
+}
+
 double ChiSquaredQuantile(double share, int freedom) {
   if (freedom == 1) {
     return std::pow(NormalQuantile(0.5 * (1.0 + share)), 2.0);

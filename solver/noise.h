@@ -36,6 +36,9 @@ inline constexpr float kLeastCosine = 0.02F;
 // Shot noise of unknown gain: right but for one factor, which the ladder measures.
 [[nodiscard]] StackNoise UnknownNoise(size_t frames);
 
+// The `share` quantile of at least one value, which are put into another order.
+[[nodiscard]] float QuantileOf(std::vector<float>& values, double share);
+
 // The `share` quantile of chi^2 over its degrees of freedom: of one and two in closed form, beyond
 // by Wilson and Hilferty's cube root, within 7 % for shares of 0.05 and more.
 [[nodiscard]] double ChiSquaredQuantile(double share, int freedom);

@@ -124,13 +124,6 @@ int UsualSamples(const MisfitSample& sample) {
   return *most > 0 ? static_cast<int>(most - counts.begin()) : 0;
 }
 
-float QuantileOf(std::vector<float>& values, double share) {
-  const auto place =
-      values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), place, values.end());
-  return *place;
-}
-
 // What neighbouring samples tell of the noise.
 struct Neighbours {
   double scale_squared = kNotKnown;  // infinite where they tell nothing

@@ -7,100 +7,22 @@
 #include <cmath>
 
 #include "core/angle.h"
-#include "simulation/random.h"
-#include "simulation/relief.h"
-#include "simulation/rigs.h"
-#include "solver/light_doubt.h"
-#include "tests/solver/solver_cases.h"
+#include "tests/solver/mosaic_cases.h"
 
 namespace sateen {
 namespace {
 
+using testing::CompareErrors;
 using testing::DistantRig;
+using testing::ErrorsAndUncertainty;
+using testing::kBlackDn;
+using testing::kSize;
+using testing::Ladder;
+using testing::Plain;
+using testing::Readings;
 using testing::ReasonAt;
 using testing::Render;
 using testing::SameBits;
-
-constexpr std::array<uint8_t, 4> kRggb = {0, 1, 1, 2};
-constexpr double kBlackDn = 500.0;
-constexpr double kWhiteDn = 64000.0;
-constexpr double kGainDn = 2.0;
-constexpr double kReadDn = 8.0;
-constexpr ImageSize kSize = {96, 70};
-
-// Mosaics of a rendered scene as a 16-bit sensor reads them, and what they are made of.
-struct Readings {
-  std::vector<Image<uint16_t>> frames;
-  MosaicStack stack;
-
-  explicit Readings(const RenderedRelief& scene, const Rig& rig) {
-    stack.size_px = scene.normal.Size();
-    stack.cfa = kRggb;
-    float most = 0.0F;
-    for (const LightFrame& frame : scene.stack) {
-      for (const Image<float>& plane : frame.rgb.planes) {
-        most = std::max(most, *std::ranges::max_element(plane.pixels));
-      }
-    }
-    const double per_dn = 1.1 * static_cast<double>(most) / (kWhiteDn - kBlackDn);
-    for (size_t k = 0; k < rig.lights.size(); ++k) {
-      stack.lit.push_back(FrameOf(per_dn));
-      Image<uint16_t> readings(stack.size_px);
-      for (int y = 0; y < readings.height; ++y) {
-        for (int x = 0; x < readings.width; ++x) {
-          const size_t c = kRggb[static_cast<size_t>(y % 2 * 2 + x % 2)];
-          const auto radiance = static_cast<double>(scene.stack[k].rgb[c].At(x, y));
-          readings.At(x, y) = static_cast<uint16_t>(std::lround(kBlackDn + radiance / per_dn));
-        }
-      }
-      frames.push_back(std::move(readings));
-    }
-  }
-
-  static MosaicFrame FrameOf(double per_dn) {
-    MosaicFrame frame{.saturated_dn = static_cast<float>(kWhiteDn),
-                      .gain_dn = kGainDn,
-                      .read_dn = kReadDn,
-                      .name = "frame"};
-    frame.per_dn.fill(static_cast<float>(per_dn));
-    frame.at_zero.fill(static_cast<float>(-kBlackDn * per_dn));
-    return frame;
-  }
-
-  void AddNoise(uint64_t seed) {
-    uint64_t counter = 0;
-    for (Image<uint16_t>& frame : frames) {
-      for (uint16_t& reading : frame.pixels) {
-        const double signal = static_cast<double>(reading) - kBlackDn;
-        const double deviation = std::sqrt(kGainDn * signal + kReadDn * kReadDn);
-        reading = static_cast<uint16_t>(
-            std::lround(static_cast<double>(reading) + deviation * NormalDeviate(seed, counter++)));
-      }
-    }
-  }
-
-  void ForgetNoise() {
-    for (MosaicFrame& frame : stack.lit) {
-      frame.gain_dn = 0.0;
-      frame.read_dn = 0.0;
-    }
-  }
-
-  [[nodiscard]] NormalField Solve(const Rig& rig, const MosaicOptions& options = {},
-                                  int threads = 0, const std::optional<Mask>& mask = std::nullopt) {
-    const MosaicsInMemory rows(frames);
-    stack.rows = &rows;
-    return SolveMosaic(stack, rig, mask, options, {.threads = threads}).value();
-  }
-};
-
-MosaicOptions Plain(Backend backend = Backend::kAuto) {
-  return {.mode = std::nullopt, .least_squares = {.backend = backend}};
-}
-
-MosaicOptions Ladder(LadderMode mode, Backend backend = Backend::kAuto) {
-  return {.mode = mode, .least_squares = {.backend = backend}};
-}
 
 std::vector<Rig> AllRigs() {
   return {DistantRig(DistantRing(10, 40.0 * kRadPerDeg)), RingRig(kSize, LightModel::kNear),
@@ -208,28 +130,6 @@ TEST(MosaicTest, EverySiteIsSolvedInItsOwnColour) {
     ASSERT_NEAR(field.albedo[1].pixels[p], 0.4F, 0.001F) << p;
     ASSERT_NEAR(field.albedo[2].pixels[p], 0.1F, 0.001F) << p;
   }
-}
-
-struct ErrorsAndUncertainty {
-  double actual_over_predicted = 0.0;  // of the root mean squares
-  double standardised = 0.0;           // root mean square of error over uncertainty
-};
-
-ErrorsAndUncertainty CompareErrors(const NormalField& field, const RenderedRelief& truth) {
-  Image<float> error_deg;
-  EXPECT_TRUE(AngularErrorDeg(field, truth.normal, &error_deg));
-  double squares = 0.0;
-  double predicted = 0.0;
-  double standardised = 0.0;
-  for (size_t p = 0; p < error_deg.pixels.size(); ++p) {
-    const auto e = static_cast<double>(error_deg.pixels[p]);
-    const auto u = static_cast<double>(field.uncertainty.pixels[p]);
-    squares += e * e;
-    predicted += u * u;
-    standardised += e * e / (u * u);
-  }
-  return {.actual_over_predicted = std::sqrt(squares / predicted),
-          .standardised = std::sqrt(standardised / static_cast<double>(error_deg.pixels.size()))};
 }
 
 // The bound of Cramer and Rao is what `uncertainty` says of a Lambertian site of known noise.
@@ -359,114 +259,6 @@ TEST(MosaicTest, UnsolvableSitesHaveTheirReason) {
     }
     EXPECT_EQ(field.uncertainty.pixels[p], 0.0F);
   }
-}
-
-// As above, with nothing said of the noise: readings of a bright scene, whose read noise is little.
-TEST(MosaicTest, NoiseThatIsNotKnownIsMeasured) {
-  const Rig rig = RingRig({256, 192}, LightModel::kNear);
-  const RenderedRelief truth = Render(rig, {256, 192});
-  Readings readings(truth, rig);
-  readings.AddNoise(11);
-  readings.ForgetNoise();
-  const NormalField whole = readings.Solve(rig);
-  EXPECT_FALSE(whole.summary.noise_known);
-  EXPECT_NEAR(whole.summary.noise_scale, std::sqrt(kGainDn), 0.05 * std::sqrt(kGainDn));
-  EXPECT_NEAR(CompareErrors(whole, truth).standardised, 1.0, 0.07);
-  EXPECT_LT(whole.summary.robust.pixels, whole.summary.solved / 200);
-
-  // A mask between the rows that would be looked at without one.
-  Mask mask(whole.reason.Size());
-  for (int x = 20; x < 200; ++x) {
-    mask.At(x, 100) = 255;
-  }
-  const NormalField masked = readings.Solve(rig, {}, 0, mask);
-  EXPECT_NEAR(masked.summary.noise_scale, std::sqrt(kGainDn), 0.3 * std::sqrt(kGainDn));
-}
-
-// A scene that shines everywhere misfits everywhere; what neighbours differ by is not fooled.
-TEST(MosaicTest, ShineIsNotTakenForNoise) {
-  const Rig rig = RingRig({256, 192}, LightModel::kNear);
-  RenderedRelief truth = Render(rig, {256, 192});
-  for (size_t k = 0; k < truth.stack.size(); k += 3) {
-    for (Image<float>& plane : truth.stack[k].rgb.planes) {
-      std::ranges::transform(plane.pixels, plane.pixels.begin(), [](float i) { return 1.5F * i; });
-    }
-  }
-  Readings readings(truth, rig);
-  readings.AddNoise(11);
-  readings.ForgetNoise();
-  const NormalField field = readings.Solve(rig);
-  EXPECT_LT(field.summary.noise_scale, 2.0 * std::sqrt(kGainDn));
-}
-
-// Reasons are told where there is nothing to measure noise on.
-TEST(MosaicTest, ADarkCaptureOfUnknownNoiseIsDark) {
-  const Rig rig = DistantRig(DistantRing(5, 40.0 * kRadPerDeg));
-  Readings readings(Render(rig, kSize), rig);
-  for (Image<uint16_t>& frame : readings.frames) {
-    std::ranges::fill(frame.pixels, static_cast<uint16_t>(kBlackDn));
-  }
-  readings.ForgetNoise();
-  const NormalField field = readings.Solve(rig);
-  EXPECT_EQ(field.summary.dark, static_cast<int64_t>(kSize.PixelCount()));
-}
-
-// Readings of few whole numbers, whose neighbours mostly do not differ: 0.05 DN an electron.
-TEST(MosaicTest, NoiseBelowRoundingIsMeasured) {
-  const Rig rig = RingRig({256, 192}, LightModel::kNear);
-  Readings readings(Render(rig, {256, 192}), rig);
-  uint64_t counter = 0;
-  for (Image<uint16_t>& frame : readings.frames) {
-    for (uint16_t& reading : frame.pixels) {
-      const double signal = (static_cast<double>(reading) - kBlackDn) / 4000.0;  // 0 to 14 DN
-      reading = static_cast<uint16_t>(
-          std::lround(20.0 + signal + std::sqrt(0.02 * signal) * NormalDeviate(5, counter++)));
-    }
-  }
-  for (MosaicFrame& frame : readings.stack.lit) {
-    frame.per_dn.fill(frame.per_dn[0] * 4000.0F);
-    frame.at_zero.fill(-20.0F * frame.per_dn[0]);
-    frame.saturated_dn = 40.0F;
-  }
-  readings.ForgetNoise();
-  const NormalField field = readings.Solve(rig);
-  EXPECT_GT(field.summary.noise_scale, std::sqrt(0.01));
-  EXPECT_LT(field.summary.noise_scale, std::sqrt(0.06));
-}
-
-TEST(MosaicTest, LightsThatAreUncertainMakeNormalsUncertain) {
-  Rig rig = RingRig({96, 150}, LightModel::kNear);
-  Readings readings(Render(rig, {96, 150}), rig);
-  const NormalField sure = readings.Solve(rig, Ladder(LadderMode::kLeastSquares));
-  for (Light& light : rig.lights) {
-    light.irradiance_sd = 0.02;
-  }
-  MosaicOptions by_bands = Ladder(LadderMode::kLeastSquares);
-  by_bands.band_rows = 40;
-  const NormalField unsure = readings.Solve(rig, by_bands);
-  NormalField expected = sure;
-  const LightDoubt doubt = LightDoubt::Make(rig, {96, 150}).value();
-  for (const int row : {3, 70, 149}) {
-    doubt.AddToRow(row, sure.reason.Index(0, row), expected);
-    for (int x = 0; x < 96; ++x) {
-      ASSERT_FLOAT_EQ(unsure.uncertainty.At(x, row), expected.uncertainty.At(x, row));
-      ASSERT_GT(unsure.uncertainty.At(x, row), 0.3F);
-    }
-  }
-}
-
-TEST(MosaicTest, ThreeLightsAndNoNeighboursTellNothingOfTheNoise) {
-  const Rig rig = DistantRig(DistantRing(3, 40.0 * kRadPerDeg));
-  Readings readings(Render(rig, kSize), rig);
-  readings.ForgetNoise();
-  Mask mask(kSize);
-  for (int y = 0; y < kSize.height; ++y) {
-    mask.At(40, y) = 255;
-  }
-  const NormalField field = readings.Solve(rig, {}, 0, mask);
-  EXPECT_EQ(field.summary.solved, kSize.height);
-  EXPECT_EQ(field.summary.noise_scale, 0.0);
-  EXPECT_EQ(field.uncertainty.At(40, 9), 180.0F);
 }
 
 TEST(MosaicTest, WhatCannotBeSolvedIsRefusedInWords) {
