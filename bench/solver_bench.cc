@@ -1,5 +1,5 @@
 // Single parts of the solver on one thread: the kernel per light model, with ordinary and with
-// subnormal radiance; the bytes alone; table positions; one pixel of the reference.
+// subnormal radiance, and with the noise for weights; the bytes alone; table positions; one pixel of the reference.
 
 #include <benchmark/benchmark.h>
 
@@ -63,6 +63,29 @@ BENCHMARK_CAPTURE(BM_Rows, near, &FastRows::Solve, LightModel::kNear, 1.0F);
 BENCHMARK_CAPTURE(BM_Rows, near_subnormal, &FastRows::Solve, LightModel::kNear, 1e-40F);
 BENCHMARK_CAPTURE(BM_Rows, led, &FastRows::Solve, LightModel::kLed, 1.0F);
 BENCHMARK_CAPTURE(BM_Rows, led_field, &FastRows::Solve, LightModel::kLedField, 1.0F);
+
+void BM_WeightedRows(benchmark::State& state, LightModel model) {
+  const Scene scene = MakeScene(model, 1.0F);
+  const std::optional<Mask> no_mask;
+  const StackNoise noise(scene.relief.stack.size(),
+                         {.shot = {1e-4, 1e-4, 1e-4}, .read = {1e-4, 1e-4, 1e-4}});
+  const FastRows rows = FastRows::Make(scene.relief.stack, scene.rig, no_mask, {}, &noise).value();
+  NormalField field;
+  field.Resize(kSize);
+  field.uncertainty = Image<float>(kSize);
+  field.model = Image<uint8_t>(kSize);
+  const int step = RowsPerPiece(kSize);
+  std::vector<float> misfits(static_cast<size_t>(step) * static_cast<size_t>(kSize.width));
+  for (auto _ : state) {
+    for (int row = 0; row < kSize.height; row += step) {
+      rows.SolveWeighted(row, row + step, rows.GeometryOf(row, row + step), 1.0, field, misfits);
+    }
+    benchmark::DoNotOptimize(field.normal[0].pixels.data());
+  }
+  CountPixels(state, kSize.PixelCount());
+}
+BENCHMARK_CAPTURE(BM_WeightedRows, distant, LightModel::kDistant);
+BENCHMARK_CAPTURE(BM_WeightedRows, near, LightModel::kNear);
 
 void BM_TablePositions(benchmark::State& state) {
   const Rig rig = RingRig(kSize);

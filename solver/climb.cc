@@ -18,6 +18,8 @@
 namespace sateen {
 namespace {
 
+constexpr int kPiecesPerClimb = 8;
+constexpr int kFewestClimbs = 32;  // so that all threads have work
 constexpr size_t kSumBlock = 512;
 constexpr size_t kBlock = 64;  // pixels that are looked at together
 
@@ -58,7 +60,7 @@ void SolveConsensusInDouble(const Climb& climb, std::span<const size_t> pixels, 
     for (size_t c = 0; c < 3; ++c) {
       const auto column = static_cast<Eigen::Index>(c);
       field.normal[c].pixels[pixel] = static_cast<float>(n[column]);
-      field.albedo[c].pixels[pixel] = static_cast<float>(answer.n_rgb.col(column).norm());
+      field.albedo[c].pixels[pixel] = static_cast<float>(answer.albedo[column]);
     }
     field.residual.pixels[pixel] = static_cast<float>(answer.residual);
     field.uncertainty.pixels[pixel] = static_cast<float>(std::min(answer.uncertainty_deg, 180.0));
@@ -130,13 +132,14 @@ void FindClimbers(const Climb& climb, std::span<const float> misfits, size_t fir
   }
 }
 
-// Rung 2 for the pixels of one piece.
-void ClimbPixels(const Climb& climb, int begin, const FastRows::Geometry& geometry,
-                 std::span<const size_t> pixels, NormalField& field, PieceSummary& summary) {
+// Rung 2 for listed pixels.
+void ClimbPixels(const Climb& climb, const ListedPixels& listed, NormalField& field,
+                 PieceSummary& summary) {
+  const std::vector<size_t>& pixels = listed.pixels;
   const std::vector<Eigen::Vector3f> before = NormalsAt(field, pixels);
   std::vector<uint8_t> agreeing(pixels.size());
   if (const FastRows* fast = climb.rows.Fast(); fast != nullptr) {
-    fast->SolveConsensus(begin, geometry, pixels, field, agreeing);
+    fast->SolveConsensus(listed, field, agreeing);
     if (climb.options.least_squares.backend == Backend::kAuto) {
       SolveRefusedInDouble(climb, pixels, field, agreeing);
     }
@@ -182,6 +185,37 @@ void SolveUnderSheen(const Climb& climb, size_t first, size_t count, NormalField
   }
 }
 
+// Rungs 1 and 3 for rows [begin, end); appends the pixels that have to climb.
+void SolvePiece(const Climb& climb, int begin, int end, NormalField& field, PieceSummary& summary,
+                ListedPixels& climbers) {
+  const PixelGeometry geometry = climb.rows.GeometryOf(begin, end);
+  const size_t first = field.reason.Index(0, begin);
+  const size_t count = field.reason.Index(0, end) - first;
+  const auto memory = std::make_unique_for_overwrite<float[]>(count);
+  const std::span<float> misfits(memory.get(), count);
+  climb.rows.SolveWeighted(begin, end, geometry, std::sqrt(climb.scale_squared), field, misfits,
+                           summary.counts);
+  for (int row = begin; climb.light_doubt && row < end; ++row) {
+    climb.light_doubt->AddToRow(row, field.reason.Index(0, row), field);
+  }
+  if (climb.sheen) {
+    summary.sheen_seconds +=
+        SecondsOf([&] { SolveUnderSheen(climb, first, count, field, summary); });
+  }
+  summary.unchecked += CountOf(static_cast<uint8_t>(Rung::kUnchecked),
+                               std::span(field.model.pixels).subspan(first, count));
+  for (size_t p = 0; p < count; p += kSumBlock) {
+    summary.least_squares_deg += SumOf(
+        std::span(field.uncertainty.pixels).subspan(first + p, std::min(kSumBlock, count - p)));
+  }
+  std::vector<size_t> pixels;
+  FindClimbers(climb, misfits, first, field, pixels);
+  for (const size_t pixel : pixels) {
+    summary.least_squares_deg -= static_cast<double>(field.uncertainty.pixels[pixel]);
+  }
+  climbers.Append(geometry, first, pixels);
+}
+
 }  // namespace
 
 Climb MakeClimb(const LightStack& stack, const Rig& rig, const LadderOptions& options,
@@ -197,39 +231,23 @@ Climb MakeClimb(const LightStack& stack, const Rig& rig, const LadderOptions& op
           std::nullopt};
 }
 
+int RowsPerClimb(ImageSize size) {
+  const int rows = RowsPerPiece(size);
+  return rows * std::clamp(size.height / (rows * kFewestClimbs), 1, kPiecesPerClimb);
+}
+
 PieceSummary SolveAndClimb(const Climb& climb, int begin, int end, NormalField& field) {
   PieceSummary summary;
-  const FastRows::Geometry geometry = climb.rows.GeometryOf(begin, end);
-  const size_t first = field.reason.Index(0, begin);
-  const size_t count = field.reason.Index(0, end) - first;
-  const auto memory = std::make_unique_for_overwrite<float[]>(count);
-  const std::span<float> misfits(memory.get(), count);
-  climb.rows.SolveWeighted(begin, end, geometry, std::sqrt(climb.scale_squared), field, misfits,
-                           summary.counts);
-  for (int row = begin; climb.light_doubt && row < end; ++row) {
-    climb.light_doubt->AddToRow(row, field.reason.Index(0, row), field);
-  }
-  if (climb.sheen) {
-    summary.sheen_seconds =
-        SecondsOf([&] { SolveUnderSheen(climb, first, count, field, summary); });
-  }
-  summary.unchecked = CountOf(static_cast<uint8_t>(Rung::kUnchecked),
-                              std::span(field.model.pixels).subspan(first, count));
-  for (size_t p = 0; p < count; p += kSumBlock) {
-    summary.least_squares_deg += SumOf(
-        std::span(field.uncertainty.pixels).subspan(first + p, std::min(kSumBlock, count - p)));
+  ListedPixels climbers;
+  const int step = RowsPerPiece(field.reason.Size());
+  for (int row = begin; row < end; row += step) {
+    SolvePiece(climb, row, std::min(end, row + step), field, summary, climbers);
   }
   summary.least_squares_deg -= summary.sheen_deg;
-  std::vector<size_t> pixels;
-  FindClimbers(climb, misfits, first, field, pixels);
-  for (const size_t pixel : pixels) {
-    summary.least_squares_deg -= static_cast<double>(field.uncertainty.pixels[pixel]);
-  }
   summary.least_squares = summary.counts.solved - summary.unchecked - summary.sheen -
-                          static_cast<int64_t>(pixels.size());
-  if (!pixels.empty()) {
-    summary.climbing_seconds =
-        SecondsOf([&] { ClimbPixels(climb, begin, geometry, pixels, field, summary); });
+                          static_cast<int64_t>(climbers.pixels.size());
+  if (!climbers.pixels.empty()) {
+    summary.climbing_seconds = SecondsOf([&] { ClimbPixels(climb, climbers, field, summary); });
   }
   return summary;
 }

@@ -29,7 +29,11 @@ struct Climb {
                               const LeastSquaresRows& rows, const StackNoise& noise,
                               double scale_squared);
 
-// All rungs for rows [begin, end), while their samples are in the cache.
+// Rows that SolveAndClimb takes at a time: several pieces, because those few pixels of a piece that climb
+// do not fill a vector.
+[[nodiscard]] int RowsPerClimb(ImageSize size);
+
+// All rungs for rows [begin, end), piece by piece while their samples are in the cache.
 [[nodiscard]] PieceSummary SolveAndClimb(const Climb& climb, int begin, int end,
                                          NormalField& field);
 

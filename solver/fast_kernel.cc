@@ -36,6 +36,34 @@ HWY_INLINE VI ReasonOf(const Gathered& gathered, M enough, M accepted) {
   return hn::IfThenElse(bits(gathered.bright), bright, code(Reason::kDark));
 }
 
+// N, of luminance, and what else a vector of pixels comes to, as far as it is accepted.
+struct Answer {
+  Vector3 n;
+  V albedo[3];
+  V sum_of_squares;
+  V count;
+  M accepted;
+};
+
+template <bool kDistant>
+HWY_INLINE Answer SolvePlain(const KernelParams& params, const float* scratch, V threshold) {
+  const NormalEquations eq = Accumulate<kDistant>(params, scratch, threshold);
+  const Inverse inverse = Invert(eq.a, params.max_condition_squared);
+  const Vector3 n = Times(inverse.a, LuminanceOf(eq.b));  // (3)
+  const Residual residual = ResidualOf<kDistant>(params, scratch, threshold, n);
+  const Vector3 step = Times(inverse.a, residual.gradient);
+  Answer answer{{hn::Add(n.x, step.x), hn::Add(n.y, step.y), hn::Add(n.z, step.z)},
+                {},
+                residual.sum_of_squares,
+                eq.count,
+                inverse.accepted};
+  for (size_t c = 0; c < 3; ++c) {
+    const Vector3 n_c = Times(inverse.a, eq.b[c]);
+    answer.albedo[c] = hn::Sqrt(Dot(n_c, n_c));  // (4)
+  }
+  return answer;
+}
+
 template <bool kDistant, bool kWeighted>
 HWY_INLINE void SolveVector(const KernelParams& params, const KernelInput& input, size_t offset,
                             const KernelOutput& output, State& state) {
@@ -58,51 +86,33 @@ HWY_INLINE void SolveVector(const KernelParams& params, const KernelInput& input
   const Gathered gathered = GatherScaled<kDistant>(params, input, offset, x_mm, y_mm, scale, state);
   float* scratch = state.scratch.get();
   const V threshold = hn::Mul(gathered.brightest, hn::Set(d, params.shadow_level));
-  const NormalEquations eq = Accumulate<kDistant>(params, scratch, threshold);
-  const Inverse inverse = Invert(eq.a, params.max_condition_squared);
-  Vector3 n_rgb[3] = {Times(inverse.cofactor, eq.b[0]), Times(inverse.cofactor, eq.b[1]),
-                      Times(inverse.cofactor, eq.b[2])};
-  Vector3 n = Times(inverse.cofactor, LuminanceOf(eq.b));
-  NoiseUnits units;
-  if constexpr (kWeighted) {
-    units = NoiseUnitsOf<kDistant>(params.lights[0], scratch, n_rgb, n, inverse.inverse_det, scale);
-  }
-  for (Vector3* v : {&n_rgb[0], &n_rgb[1], &n_rgb[2], &n}) {
-    *v = Scaled(*v, inverse.inverse_det);  // (3)
-  }
-  const M enough = hn::Ge(eq.count, hn::Set(d, 3.0F));
+  Answer answer;
   Weighted weighted;
-  V sum_of_squares;
   if constexpr (kWeighted) {
-    weighted = WeightedStep<kDistant>(params, scratch, threshold, units, n, eq.count);
-    sum_of_squares = weighted.sum_of_squares;
-    n = weighted.n;
+    weighted = SolveWeighted<kDistant>(params, scratch, threshold, scale);
+    answer = {weighted.n, {}, weighted.sum_of_squares, weighted.count, weighted.accepted};
   } else {
-    const Residual residual = ResidualOf<kDistant>(params, scratch, threshold, n);
-    sum_of_squares = residual.sum_of_squares;
-    const Vector3 step = Times(inverse.a, residual.gradient);
-    n = {hn::Add(n.x, step.x), hn::Add(n.y, step.y), hn::Add(n.z, step.z)};
+    answer = SolvePlain<kDistant>(params, scratch, threshold);
   }
-  const V squared = Dot(n, n);
+  const V squared = Dot(answer.n, answer.n);
   const M finite = hn::And(hn::Gt(squared, hn::Zero(d)), hn::Lt(squared, hn::Set(d, 1e38F)));
-  M accepted = hn::And(inverse.accepted, finite);
-  if constexpr (kWeighted) {
-    accepted = hn::And(accepted, weighted.accepted);
-  }
+  const M enough = hn::Ge(answer.count, hn::Set(d, 3.0F));
+  const M accepted = hn::And(answer.accepted, finite);
   const M solved = hn::And(hn::And(inside, gathered.bright), hn::And(enough, accepted));
-  const V inverse_length = hn::Div(one, hn::Sqrt(hn::IfThenElse(solved, squared, one)));  // (4)
+  const V length = hn::Sqrt(hn::IfThenElse(solved, squared, one));
+  const V inverse_length = hn::Div(one, length);  // (4)
   const V result_scale = hn::Set(d, params.result_scale);
   const auto store = [&](V value, float* to) {
     hn::StoreU(hn::IfThenElseZero(solved, value), d, to + offset);
   };
-  store(hn::Mul(n.x, inverse_length), output.normal[0]);
-  store(hn::Mul(n.y, inverse_length), output.normal[1]);
-  store(hn::Mul(n.z, inverse_length), output.normal[2]);
+  store(hn::Mul(answer.n.x, inverse_length), output.normal[0]);
+  store(hn::Mul(answer.n.y, inverse_length), output.normal[1]);
+  store(hn::Mul(answer.n.z, inverse_length), output.normal[2]);
   for (size_t c = 0; c < 3; ++c) {
-    store(ScaleDown(hn::Mul(hn::Sqrt(Dot(n_rgb[c], n_rgb[c])), result_scale), scale),
-          output.albedo[c]);
+    const V albedo = kWeighted ? hn::Mul(weighted.colour[c], length) : answer.albedo[c];
+    store(ScaleDown(hn::Mul(albedo, result_scale), scale), output.albedo[c]);
   }
-  const V mean = hn::Div(sum_of_squares, hn::Max(eq.count, one));
+  const V mean = hn::Div(answer.sum_of_squares, hn::Max(answer.count, one));
   store(ScaleDown(hn::Mul(hn::Sqrt(mean), result_scale), scale), output.residual);
   if constexpr (kWeighted) {
     const V uncertainty =
@@ -110,7 +120,7 @@ HWY_INLINE void SolveVector(const KernelParams& params, const KernelInput& input
     const V unknown = hn::Set(d, 180.0F);
     store(hn::IfThenElse(hn::Lt(uncertainty, unknown), uncertainty, unknown), output.uncertainty);
     store(weighted.misfit, output.misfit);
-    const M unchecked = hn::Le(eq.count, hn::Set(d, 3.0F));
+    const M unchecked = hn::Le(answer.count, hn::Set(d, 3.0F));
     const VI rung = hn::IfThenElse(hn::RebindMask(di, unchecked),
                                    hn::Set(di, static_cast<int32_t>(Rung::kUnchecked)),
                                    hn::Set(di, static_cast<int32_t>(Rung::kLeastSquares)));
@@ -118,7 +128,7 @@ HWY_INLINE void SolveVector(const KernelParams& params, const KernelInput& input
   }
   const auto inside_bits = hn::RebindMask(di, inside);
   StoreBytes(
-      hn::IfThenElseZero(inside_bits, hn::Min(hn::ConvertTo(di, eq.count), hn::Set(di, 255))),
+      hn::IfThenElseZero(inside_bits, hn::Min(hn::ConvertTo(di, answer.count), hn::Set(di, 255))),
       output.samples + offset);
   StoreBytes(hn::IfThenElseZero(inside_bits, ReasonOf(gathered, enough, accepted)),
              output.reason + offset);

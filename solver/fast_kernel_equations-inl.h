@@ -49,6 +49,15 @@ HWY_INLINE Vector3 DirectionOf(const KernelLight& light, const float* slot, M us
   }
 }
 
+HWY_INLINE void AddSquare(const Vector3& l, Symmetric3& sum) {
+  sum.xx = hn::MulAdd(l.x, l.x, sum.xx);
+  sum.xy = hn::MulAdd(l.x, l.y, sum.xy);
+  sum.xz = hn::MulAdd(l.x, l.z, sum.xz);
+  sum.yy = hn::MulAdd(l.y, l.y, sum.yy);
+  sum.yz = hn::MulAdd(l.y, l.z, sum.yz);
+  sum.zz = hn::MulAdd(l.z, l.z, sum.zz);
+}
+
 struct NormalEquations {
   Symmetric3 a;  // sum of l l^T
   Vector3 b[3];  // sum of l i'_c
@@ -67,12 +76,7 @@ HWY_INLINE NormalEquations Accumulate(const KernelParams& params, const float* s
     const float* slot = scratch + k * kScratchPerLight * lanes;
     const M usable = hn::Gt(hn::Load(d, slot + 6 * lanes), threshold);
     const Vector3 l = DirectionOf<kDistant>(params.lights[k], slot, usable);
-    eq.a.xx = hn::MulAdd(l.x, l.x, eq.a.xx);
-    eq.a.xy = hn::MulAdd(l.x, l.y, eq.a.xy);
-    eq.a.xz = hn::MulAdd(l.x, l.z, eq.a.xz);
-    eq.a.yy = hn::MulAdd(l.y, l.y, eq.a.yy);
-    eq.a.yz = hn::MulAdd(l.y, l.z, eq.a.yz);
-    eq.a.zz = hn::MulAdd(l.z, l.z, eq.a.zz);
+    AddSquare(l, eq.a);
     AddScaled(l, hn::IfThenElseZero(usable, hn::Load(d, slot + 3 * lanes)), eq.b[0]);
     AddScaled(l, hn::IfThenElseZero(usable, hn::Load(d, slot + 4 * lanes)), eq.b[1]);
     AddScaled(l, hn::IfThenElseZero(usable, hn::Load(d, slot + 5 * lanes)), eq.b[2]);

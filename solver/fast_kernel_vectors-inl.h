@@ -66,6 +66,15 @@ HWY_INLINE V ReciprocalOf(V v) {
 #endif
 }
 
+// 1 / v to some 3e-4, for weights and uncertainties.
+HWY_INLINE V RoughReciprocalOf(V v) {
+#if HWY_ARCH_X86
+  return hn::ApproximateReciprocal(v);
+#else
+  return hn::Div(hn::Set(D(), 1.0F), v);
+#endif
+}
+
 HWY_INLINE V ReciprocalRootOf(V v) {
   const D d;
 #if HWY_ARCH_X86

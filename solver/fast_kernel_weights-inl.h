@@ -31,16 +31,49 @@ constexpr float kLeastVariance = 1e-9F;
 
 struct Weighted {
   Vector3 n;
+  V colour[3];  // b_c of (2)
   V uncertainty_deg;
   V misfit;
   V sum_of_squares;  // of the luminance's residuals, as ResidualOf has it
+  V count;
   M accepted;
 };
+
+// What the weighted step starts from.
+struct StartEquations {
+  Symmetric3 a;  // sum of l l^T
+  Vector3 b;     // sum of l i'
+  V sum[3];      // of i'_c
+  V count;
+};
+
+template <bool kDistant>
+HWY_INLINE StartEquations AccumulateStart(const KernelParams& params, const float* scratch,
+                                          V threshold) {
+  const D d;
+  const size_t lanes = hn::Lanes(d);
+  const V zero = hn::Zero(d);
+  StartEquations eq{
+      {zero, zero, zero, zero, zero, zero}, {zero, zero, zero}, {zero, zero, zero}, zero};
+  for (size_t k = 0; k < params.lights.size(); ++k) {
+    const float* slot = scratch + k * kScratchPerLight * lanes;
+    const V luminance = hn::Load(d, slot + 6 * lanes);
+    const M usable = hn::Gt(luminance, threshold);
+    const Vector3 l = DirectionOf<kDistant>(params.lights[k], slot, usable);
+    AddSquare(l, eq.a);
+    AddScaled(l, hn::IfThenElseZero(usable, luminance), eq.b);
+    for (size_t c = 0; c < 3; ++c) {
+      eq.sum[c] = hn::Add(eq.sum[c], hn::IfThenElseZero(usable, hn::Load(d, slot + (3 + c) * lanes)));
+    }
+    eq.count = hn::Add(eq.count, hn::IfThenElseZero(usable, hn::Set(d, 1.0F)));
+  }
+  return eq;
+}
 
 // Variance of N / |N| across N, as an angle: (tr C - n C n) / |N|^2.
 HWY_INLINE V AngularVariance(const Symmetric3& c, const Vector3& n) {
   const D d;
-  const V inverse = ReciprocalOf(hn::Max(Dot(n, n), hn::Set(d, 1e-37F)));
+  const V inverse = RoughReciprocalOf(hn::Max(Dot(n, n), hn::Set(d, 1e-37F)));
   const V trace = hn::Add(c.xx, hn::Add(c.yy, c.zz));
   const V across = hn::NegMulAdd(Dot(n, Times(c, n)), inverse, trace);
   return hn::Mul(hn::Max(across, hn::Zero(d)), inverse);
@@ -72,20 +105,14 @@ struct NoiseUnits {
   V reference;
 };
 
-// `n_rgb` and `n` are N_c and N times the determinant: their ratios need not wait for its reciprocal. All of
-// this is one chain, during which the processor does little else; with divisions and with N itself it was
-// longer by a third.
+// Variances of (1) on a pixel that faces light 0.
 template <bool kDistant>
-HWY_INLINE NoiseUnits NoiseUnitsOf(const KernelLight& light, const float* slot,
-                                   const Vector3* n_rgb, const Vector3& n, V inverse_det,
-                                   const Scale& scale) {
+HWY_INLINE NoiseUnits NoiseUnitsOf(const KernelLight& light, const float* slot, const V* b,
+                                   const Vector3& n, const Scale& scale) {
   const D d;
   const V zero = hn::Zero(d);
   const V tiny = hn::Set(d, 1e-37F);
-  const V squared = hn::Max(Dot(n, n), tiny);
-  const V inverse_length = ReciprocalRootOf(squared);
-  const V inverse_squared = hn::Mul(inverse_length, inverse_length);
-  const V length = hn::Mul(hn::Mul(squared, inverse_det), inverse_length);  // of N
+  const V length = RootOf(Dot(n, n));
   // The square must not overflow; at such radiance nothing but read noise is left.
   const V forward = hn::Min(scale.forward, hn::Set(d, 0x1p60F));
   V gain = hn::Set(d, 1.0F);
@@ -95,10 +122,8 @@ HWY_INLINE NoiseUnits NoiseUnitsOf(const KernelLight& light, const float* slot,
   }
   const V read = hn::Mul(forward, forward);
   const V shot = hn::Mul(forward, length);
-  V b[3];
   V variance[3];
   for (size_t c = 0; c < 3; ++c) {
-    b[c] = hn::Mul(hn::Max(Dot(n_rgb[c], n), zero), inverse_squared);  // (2)
     variance[c] = hn::MulAdd(b[c], hn::Mul(shot, hn::Set(d, light.shot[c])),
                              hn::Mul(hn::Mul(gain, hn::Set(d, light.read_squared[c])), read));
   }
@@ -106,7 +131,7 @@ HWY_INLINE NoiseUnits NoiseUnitsOf(const KernelLight& light, const float* slot,
   const V least = hn::MulAdd(sum, hn::Set(d, kLeastVarianceShare), tiny);
   V t[3];
   for (size_t c = 0; c < 3; ++c) {
-    t[c] = hn::Mul(b[c], ReciprocalOf(hn::Max(variance[c], least)));
+    t[c] = hn::Mul(b[c], RoughReciprocalOf(hn::Max(variance[c], least)));
   }
   const V norm = hn::MulAdd(t[0], b[0], hn::MulAdd(t[1], b[1], hn::Mul(t[2], b[2])));
   const V inverse_norm = ReciprocalOf(hn::Max(norm, tiny));
@@ -177,7 +202,7 @@ HWY_INLINE void WeighSamples(const KernelParams& params, float* scratch, V thres
       const V gain = hn::Load(d, slot + 7 * lanes);
       variance = hn::Mul(gain, hn::MulAdd(gain, read, shot));
     }
-    const V weight = ReciprocalOf(hn::Max(variance, hn::Set(d, kLeastVariance)));
+    const V weight = RoughReciprocalOf(hn::Max(variance, hn::Set(d, kLeastVariance)));
     hn::Store(hn::IfThenElseZero(usable, weight), d, slot + 3 * lanes);
     hn::Store(hn::IfThenElseZero(usable, hn::Sub(mean, predicted)), d, slot + 4 * lanes);
   }
@@ -210,28 +235,41 @@ HWY_INLINE WeightedSums AccumulateWeighted(const KernelParams& params, const flo
 }
 
 template <bool kDistant>
-HWY_INLINE Weighted WeightedStep(const KernelParams& params, float* scratch, V threshold,
-                                 const NoiseUnits& units, const Vector3& n, V count) {
+HWY_INLINE Weighted SolveWeighted(const KernelParams& params, float* scratch, V threshold,
+                                  const Scale& scale) {
   const D d;
   const V zero = hn::Zero(d);
-  const V sum_of_squares = PredictSamples<kDistant>(params, scratch, threshold, n);
+  const StartEquations start = AccumulateStart<kDistant>(params, scratch, threshold);
+  Weighted weighted;
+  const V luminance = hn::MulAdd(
+      hn::Set(d, kLuminance[0]), start.sum[0],
+      hn::MulAdd(hn::Set(d, kLuminance[1]), start.sum[1],
+                 hn::Mul(hn::Set(d, kLuminance[2]), start.sum[2])));
+  const V inverse_luminance = ReciprocalOf(hn::Max(luminance, hn::Set(d, 1e-37F)));
+  for (size_t c = 0; c < 3; ++c) {
+    weighted.colour[c] = hn::Mul(hn::Max(start.sum[c], zero), inverse_luminance);  // (2)
+  }
+  const Inverse first = Invert(start.a, params.max_condition_squared);
+  const Vector3 n = Scaled(Times(first.cofactor, start.b), first.inverse_det);
+  const NoiseUnits units =
+      NoiseUnitsOf<kDistant>(params.lights[0], scratch, weighted.colour, n, scale);
+  weighted.sum_of_squares = PredictSamples<kDistant>(params, scratch, threshold, n);
   WeighSamples<kDistant>(params, scratch, threshold, units);
   const WeightedSums sums = AccumulateWeighted<kDistant>(params, scratch);
   const Inverse inverse = Invert(sums.a, params.max_condition_squared * kWeightedConditionFactor);
   const Vector3 step = Times(inverse.a, sums.gradient);
-  Weighted weighted;
   weighted.n = {hn::Add(n.x, step.x), hn::Add(n.y, step.y), hn::Add(n.z, step.z)};
   const V chi_squared = hn::Max(hn::Sub(sums.chi_squared, Dot(sums.gradient, step)), zero);
-  const V freedom = hn::Sub(count, hn::Set(d, 3.0F));
+  const V freedom = hn::Sub(start.count, hn::Set(d, 3.0F));
   weighted.misfit = hn::IfThenElseZero(
       hn::Gt(freedom, zero),
       hn::Mul(chi_squared, hn::Mul(ReciprocalOfPower(units.reference),
-                                   ReciprocalOf(hn::Max(freedom, hn::Set(d, 1.0F))))));  // (5)
+                                   RoughReciprocalOf(hn::Max(freedom, hn::Set(d, 1.0F))))));  // (5)
   weighted.uncertainty_deg =
       hn::Mul(RootOf(hn::Mul(AngularVariance(inverse.a, weighted.n), units.reference)),
               hn::Set(d, kDegreesPerRadian));  // (4)
-  weighted.sum_of_squares = sum_of_squares;
-  weighted.accepted = inverse.accepted;
+  weighted.count = start.count;
+  weighted.accepted = hn::And(first.accepted, inverse.accepted);
   return weighted;
 }
 

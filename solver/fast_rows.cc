@@ -94,8 +94,8 @@ Result<FastRows> FastRows::Make(const LightStack& stack, const Rig& rig,
   return rows;
 }
 
-FastRows::Geometry FastRows::GeometryOf(int begin, int end) const {
-  Geometry geometry;
+PixelGeometry FastRows::GeometryOf(int begin, int end) const {
+  PixelGeometry geometry;
   if (grid_) {
     const auto width = static_cast<size_t>((*stack_)[0].rgb[0].width);
     geometry.x_mm.resize(width * static_cast<size_t>(end - begin));
@@ -114,7 +114,7 @@ void FastRows::Solve(int begin, int end, NormalField& field) const {
   Run(SolveSpan, begin, end, GeometryOf(begin, end), field, nullptr);
 }
 
-void FastRows::SolveWeighted(int begin, int end, const Geometry& geometry, double noise_scale,
+void FastRows::SolveWeighted(int begin, int end, const PixelGeometry& geometry, double noise_scale,
                              NormalField& field, std::span<float> misfits) const {
   Run(SolveWeightedSpan, begin, end, geometry, field, misfits.data(), noise_scale);
 }
@@ -144,7 +144,7 @@ void FastRows::Touch(int begin, int end, NormalField& field) const {
   Run(TouchSpan, begin, end, {}, field, nullptr);
 }
 
-void FastRows::Run(SpanFunction function, int begin, int end, const Geometry& geometry,
+void FastRows::Run(SpanFunction function, int begin, int end, const PixelGeometry& geometry,
                    NormalField& field, float* misfits, double noise_scale) const {
   const size_t first = field.reason.Index(0, begin);
   const size_t count = field.reason.Index(0, end) - first;
@@ -173,60 +173,59 @@ void FastRows::Run(SpanFunction function, int begin, int end, const Geometry& ge
             .model = misfits != nullptr ? at(field.model) : nullptr});
 }
 
-KernelInput FastRows::Listed::Input() const {
-  return {.planes = planes.data(),
-          .x_mm = values.data() + (planes.size() + gains.size()) * count,
-          .y_mm = values.data() + (planes.size() + gains.size() + 1) * count,
-          .inverse_gains = gains.data(),
-          .count = count};
-}
-
-FastRows::Listed FastRows::MakeListed(std::span<const size_t> pixels) const {
-  const size_t lights = stack_->size();
-  Listed listed;
-  listed.count = pixels.size();
-  listed.values.resize((4 * lights + 2) * pixels.size(), 0.0F);
-  for (const LightFrame& frame : *stack_) {
-    for (const Image<float>& plane : frame.rgb.planes) {
-      float* const to = listed.values.data() + listed.planes.size() * pixels.size();
-      for (size_t j = 0; j < pixels.size(); ++j) {
-        to[j] = plane.pixels[pixels[j]];
-      }
-      listed.planes.push_back(to);
-    }
-  }
-  for (size_t k = 0; k < lights; ++k) {
-    const bool has_field = gains_ && gains_->Has(k);
-    listed.gains.push_back(has_field ? listed.values.data() + (3 * lights + k) * pixels.size()
-                                     : nullptr);
-  }
-  return listed;
-}
-
-void FastRows::ListGeometry(const Geometry& geometry, size_t first, std::span<const size_t> pixels,
-                            size_t begin, size_t end, Listed& listed) {
-  const size_t planes = listed.planes.size();
-  const size_t lights = listed.gains.size();
-  const auto list = [&](const float* from, size_t index) {
-    float* const to = listed.values.data() + index * listed.count;
-    for (size_t j = begin; j < end; ++j) {
-      to[j] = from[pixels[j] - first];
+void ListedPixels::Append(const PixelGeometry& geometry, size_t first,
+                          std::span<const size_t> more) {
+  const auto append = [&](const float* from, std::vector<float>& to) {
+    for (const size_t pixel : more) {
+      to.push_back(from[pixel - first]);
     }
   };
-  for (size_t k = 0; k < geometry.places.size(); ++k) {
+  pixels.insert(pixels.end(), more.begin(), more.end());
+  if (geometry.x_mm.empty()) {
+    x_mm.resize(pixels.size(), 0.0F);
+    y_mm.resize(pixels.size(), 0.0F);
+  } else {
+    append(geometry.x_mm.data(), x_mm);
+    append(geometry.y_mm.data(), y_mm);
+  }
+  gains.resize(geometry.places.size());
+  for (size_t k = 0; k < gains.size(); ++k) {
     if (geometry.places[k] != nullptr) {
-      list(geometry.places[k], planes + k);
+      append(geometry.places[k], gains[k]);
     }
   }
-  if (!geometry.x_mm.empty()) {
-    list(geometry.x_mm.data(), planes + lights);
-    list(geometry.y_mm.data(), planes + lights + 1);
+}
+
+void FastRows::RunListed(SpanFunction function, const ListedPixels& listed, bool has_positions,
+                         const KernelOutput& output) const {
+  const size_t count = listed.pixels.size();
+  std::vector<float> samples;
+  samples.reserve(3 * stack_->size() * count);
+  std::vector<const float*> planes;
+  for (const LightFrame& frame : *stack_) {
+    for (const Image<float>& plane : frame.rgb.planes) {
+      planes.push_back(samples.data() + samples.size());
+      for (const size_t pixel : listed.pixels) {
+        samples.push_back(plane.pixels[pixel]);
+      }
+    }
   }
+  std::vector<const float*> gains;
+  for (const std::vector<float>& of_light : listed.gains) {
+    gains.push_back(of_light.empty() ? nullptr : of_light.data());
+  }
+  function(params_,
+           {.planes = planes.data(),
+            .x_mm = has_positions ? listed.x_mm.data() : nullptr,
+            .y_mm = has_positions ? listed.y_mm.data() : nullptr,
+            .inverse_gains = gains.empty() ? nullptr : gains.data(),
+            .count = count},
+           output);
 }
 
 void FastRows::MisfitsAt(std::span<const size_t> pixels, std::span<float> misfits,
                          std::span<uint8_t> samples, std::span<uint8_t> reasons) const {
-  Listed listed = MakeListed(pixels);
+  ListedPixels listed;
   const auto width = static_cast<size_t>((*stack_)[0].rgb[0].width);
   for (size_t begin = 0; begin < pixels.size();) {
     const size_t row = pixels[begin] / width;
@@ -235,54 +234,50 @@ void FastRows::MisfitsAt(std::span<const size_t> pixels, std::span<float> misfit
       ++end;
     }
     const auto v = static_cast<int>(row);
-    ListGeometry(GeometryOf(v, v + 1), row * width, pixels, begin, end, listed);
+    listed.Append(GeometryOf(v, v + 1), row * width, pixels.subspan(begin, end - begin));
     begin = end;
   }
   std::vector<float> results(8 * pixels.size());
   std::vector<uint8_t> models(pixels.size());
   const auto result = [&](size_t index) { return results.data() + index * pixels.size(); };
-  KernelInput input = listed.Input();
-  if (!grid_) {
-    input.x_mm = nullptr;  // the kernel for distant lights
-  }
-  SolveWeightedSpan(params_, input,
-                    {.normal = {result(0), result(1), result(2)},
-                     .albedo = {result(3), result(4), result(5)},
-                     .residual = result(6),
-                     .samples = samples.data(),
-                     .reason = reasons.data(),
-                     .uncertainty = result(7),
-                     .misfit = misfits.data(),
-                     .model = models.data()});
+  const bool has_positions = grid_.has_value();  // else the kernel for distant lights
+  RunListed(SolveWeightedSpan, listed, has_positions,
+            {.normal = {result(0), result(1), result(2)},
+             .albedo = {result(3), result(4), result(5)},
+             .residual = result(6),
+             .samples = samples.data(),
+             .reason = reasons.data(),
+             .uncertainty = result(7),
+             .misfit = misfits.data(),
+             .model = models.data()});
 }
 
-void FastRows::SolveConsensus(int begin, const Geometry& geometry, std::span<const size_t> pixels,
-                              NormalField& field, std::span<uint8_t> agreeing) const {
-  const size_t count = pixels.size();
-  Listed listed = MakeListed(pixels);
-  ListGeometry(geometry, field.reason.Index(0, begin), pixels, 0, count, listed);
+void FastRows::SolveConsensus(const ListedPixels& listed, NormalField& field,
+                              std::span<uint8_t> agreeing) const {
+  const size_t count = listed.pixels.size();
   std::vector<float> results(8 * count);
   std::vector<uint8_t> bytes(2 * count);
   const auto result = [&](size_t index) { return results.data() + index * count; };
-  SolveConsensusSpan(params_, listed.Input(),
-                     {.normal = {result(0), result(1), result(2)},
-                      .albedo = {result(3), result(4), result(5)},
-                      .residual = result(6),
-                      .samples = bytes.data(),
-                      .reason = bytes.data() + count,
-                      .uncertainty = result(7),
-                      .agreeing = agreeing.data()});
+  RunListed(SolveConsensusSpan, listed, true,
+            {.normal = {result(0), result(1), result(2)},
+             .albedo = {result(3), result(4), result(5)},
+             .residual = result(6),
+             .samples = bytes.data(),
+             .reason = bytes.data() + count,
+             .uncertainty = result(7),
+             .agreeing = agreeing.data()});
   for (size_t j = 0; j < count; ++j) {
     if (bytes[count + j] != static_cast<uint8_t>(Reason::kSolved)) {
       agreeing[j] = 0;
       continue;
     }
+    const size_t pixel = listed.pixels[j];
     for (size_t c = 0; c < 3; ++c) {
-      field.normal[c].pixels[pixels[j]] = result(c)[j];
-      field.albedo[c].pixels[pixels[j]] = result(3 + c)[j];
+      field.normal[c].pixels[pixel] = result(c)[j];
+      field.albedo[c].pixels[pixel] = result(3 + c)[j];
     }
-    field.residual.pixels[pixels[j]] = result(6)[j];
-    field.uncertainty.pixels[pixels[j]] = result(7)[j];
+    field.residual.pixels[pixel] = result(6)[j];
+    field.uncertainty.pixels[pixel] = result(7)[j];
   }
 }
 

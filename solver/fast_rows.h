@@ -14,6 +14,25 @@
 
 namespace sateen {
 
+// Table positions and gains of consecutive pixels, as far as the lights need them.
+struct PixelGeometry {
+  std::vector<float> x_mm;
+  std::vector<float> y_mm;
+  std::vector<float> gains;
+  std::vector<const float*> places;  // of each light's gains, or null
+};
+
+// Pixels anywhere in a stack, side by side with their geometry, so that every lane of a vector has work.
+struct ListedPixels {
+  std::vector<size_t> pixels;
+  std::vector<float> x_mm;  // zero where all lights are distant
+  std::vector<float> y_mm;
+  std::vector<std::vector<float>> gains;  // of each light; empty without a field
+
+  // Appends pixels whose geometry starts with pixel `first`.
+  void Append(const PixelGeometry& geometry, size_t first, std::span<const size_t> more);
+};
+
 // Feeds rows of a stack to the kernel. Borrows the stack and the mask, which must have been checked
 // (SolveLambertian does).
 class FastRows {
@@ -24,55 +43,35 @@ class FastRows {
                                              const LambertianOptions& options,
                                              const StackNoise* noise = nullptr);
 
-  // Table positions and gains of some pixels, as far as the lights need them.
-  struct Geometry {
-    std::vector<float> x_mm;
-    std::vector<float> y_mm;
-    std::vector<float> gains;
-    std::vector<const float*> places;  // of each light's gains, or null
-  };
   // Of the pixels of rows [begin, end).
-  [[nodiscard]] Geometry GeometryOf(int begin, int end) const;
+  [[nodiscard]] PixelGeometry GeometryOf(int begin, int end) const;
 
   // Solves rows [begin, end) into `field`; refused pixels are kIllConditioned.
   void Solve(int begin, int end, NormalField& field) const;
   // With weights, for which there must be noise: also field.uncertainty, times noise_scale,
   // field.model and the misfit of each pixel.
-  void SolveWeighted(int begin, int end, const Geometry& geometry, double noise_scale,
+  void SolveWeighted(int begin, int end, const PixelGeometry& geometry, double noise_scale,
                      NormalField& field, std::span<float> misfits) const;
   // Misfit, usable samples and reason of pixels anywhere, in order of their indices.
   void MisfitsAt(std::span<const size_t> pixels, std::span<float> misfits,
                  std::span<uint8_t> samples, std::span<uint8_t> reasons) const;
-  // Rung 2 for the pixels that are listed by index, of rows from `begin` on whose geometry this is,
-  // into `field`. The others' content stays, and so does that of a listed pixel without an answer.
-  // `agreeing`, of as many entries, receives how many samples agree, 0 without an answer.
-  void SolveConsensus(int begin, const Geometry& geometry, std::span<const size_t> pixels,
-                      NormalField& field, std::span<uint8_t> agreeing) const;
+  // Rung 2 for listed pixels, into `field`. The others' content stays, and so does that of a listed pixel
+  // without an answer. `agreeing`, one for each, receives how many samples agree, 0 without an answer.
+  void SolveConsensus(const ListedPixels& listed, NormalField& field,
+                      std::span<uint8_t> agreeing) const;
   // Reads and writes the same bytes and only adds them up: the floor of Solve.
   void Touch(int begin, int end, NormalField& field) const;
 
  private:
   using SpanFunction = void (*)(const KernelParams&, const KernelInput&, const KernelOutput&);
 
-  // Samples and geometry of listed pixels side by side, so that every lane of a vector has work.
-  struct Listed {
-    std::vector<float> values;
-    std::vector<const float*> planes;
-    std::vector<const float*> gains;
-    size_t count = 0;
-
-    // Positions are zero where there are none.
-    [[nodiscard]] KernelInput Input() const;
-  };
-
   FastRows(const LightStack& stack, const std::optional<Mask>& mask)
       : stack_(&stack), mask_(&mask) {}
-  void Run(SpanFunction function, int begin, int end, const Geometry& geometry, NormalField& field,
+  void Run(SpanFunction function, int begin, int end, const PixelGeometry& geometry, NormalField& field,
            float* misfits, double noise_scale = 1.0) const;
-  [[nodiscard]] Listed MakeListed(std::span<const size_t> pixels) const;
-  // Positions and gains of pixels[begin, end), whose geometry starts with pixel `first`.
-  static void ListGeometry(const Geometry& geometry, size_t first, std::span<const size_t> pixels,
-                           size_t begin, size_t end, Listed& listed);
+  // Runs `function` over listed pixels.
+  void RunListed(SpanFunction function, const ListedPixels& listed, bool has_positions,
+                 const KernelOutput& output) const;
   // 1 / g of rows [begin, end) for each light that has a field: `gains` holds them, `places` where.
   void FillGains(int begin, int end, std::vector<float>& gains,
                  std::vector<const float*>& places) const;

@@ -144,7 +144,7 @@ Status ClimbAllRows(const Climb& climb, const Task& task, NormalField& field, Pi
   const ImageSize size = field.reason.Size();
   std::vector<PieceSummary> pieces(static_cast<size_t>(size.height));
   task.BeginStage("solving", size.height);
-  Status status = ParallelFor(size.height, RowsPerPiece(size), task, [&](int begin, int end) {
+  Status status = ParallelFor(size.height, RowsPerClimb(size), task, [&](int begin, int end) {
     pieces[static_cast<size_t>(begin)] = SolveAndClimb(climb, begin, end, field);
   });
   for (const PieceSummary& piece : pieces) {

@@ -35,14 +35,14 @@ struct LadderOptions {
 
 /// Surface normal, albedo and uncertainty per pixel, by the lowest rung that explains the samples.
 ///
-/// Rung 1, least squares with the samples' noise for weights. N^0, N_c^0 are SolveLambertian's, f_kc
-/// = 1 / e_kc, and SampleNoise gives shot and read noise:
+/// Rung 1, least squares with the samples' noise for weights. N^0 is SolveLambertian's, f_kc = 1 / e_kc,
+/// and SampleNoise gives shot and read noise; sums over k are over usable samples:
 ///
 ///     var_kc = f_kc (shot_c b_c max(N^0 . l_k, 0.02 |N^0|) + f_kc read_c^2)                   (1)
-///     b_c = max(0, N_c^0 . N^0 / |N^0|^2)                                                    (2)
+///     b_c = max(0, sum_k i'_kc) / sum_k i'_k                                                 (2)
 ///     m_k = sum_c u_c i'_kc,  u_c = (b_c / v_c) / sum_c (b_c^2 / v_c), v_c = (1) of the first
 ///     light on a pixel that faces it, at least a millionth of the three                      (3)
-///     N = argmin sum_k W_k (m_k - N . l_k)^2 over usable samples k,  W_k = 1 / sum_c u_c^2 var_kc,
+///     N = argmin sum_k W_k (m_k - N . l_k)^2,  W_k = 1 / sum_c u_c^2 var_kc,  rho_c = b_c |N|,
 ///     uncertainty = s sqrt(tr C - n.C n) / |N|,  C = (sum_k W_k l_k l_k^T)^-1                (4)
 ///     misfit = sum_k W_k (m_k - N . l_k)^2 / (usable - 3)                                    (5)
 ///

@@ -151,8 +151,8 @@ Result<LeastSquaresRows> LeastSquaresRows::Make(const LightStack& stack, const R
   return rows;
 }
 
-FastRows::Geometry LeastSquaresRows::GeometryOf(int begin, int end) const {
-  return fast_ ? fast_->GeometryOf(begin, end) : FastRows::Geometry{};
+PixelGeometry LeastSquaresRows::GeometryOf(int begin, int end) const {
+  return fast_ ? fast_->GeometryOf(begin, end) : PixelGeometry{};
 }
 
 void LeastSquaresRows::Solve(int begin, int end, NormalField& field, SolveSummary& counts) const {
@@ -161,11 +161,11 @@ void LeastSquaresRows::Solve(int begin, int end, NormalField& field, SolveSummar
   } else {
     ClearRows(*mask_, begin, end, field);
   }
-  counts.resolved_by_reference = SolvePending(begin, end, 1.0, field, {});
+  counts.resolved_by_reference += SolvePending(begin, end, 1.0, field, {});
   CountReasons(begin, end, field, counts);
 }
 
-void LeastSquaresRows::SolveWeighted(int begin, int end, const FastRows::Geometry& geometry,
+void LeastSquaresRows::SolveWeighted(int begin, int end, const PixelGeometry& geometry,
                                      double noise_scale, NormalField& field,
                                      std::span<float> misfits, SolveSummary& counts) const {
   if (fast_) {
@@ -173,7 +173,7 @@ void LeastSquaresRows::SolveWeighted(int begin, int end, const FastRows::Geometr
   } else {
     ClearRows(*mask_, begin, end, field);
   }
-  counts.resolved_by_reference = SolvePending(begin, end, noise_scale, field, misfits);
+  counts.resolved_by_reference += SolvePending(begin, end, noise_scale, field, misfits);
   CountReasons(begin, end, field, counts);
 }
 

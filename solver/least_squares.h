@@ -29,12 +29,12 @@ class LeastSquaresRows {
                                                      const StackNoise* noise);
 
   // What the fast backends know of these rows; empty for the others.
-  [[nodiscard]] FastRows::Geometry GeometryOf(int begin, int end) const;
+  [[nodiscard]] PixelGeometry GeometryOf(int begin, int end) const;
   // Solves rows [begin, end) into `field` and counts them in `counts`.
   void Solve(int begin, int end, NormalField& field, SolveSummary& counts) const;
   // With weights: also field.uncertainty, equation (4) with this s, field.model and equation (5) of
   // each pixel.
-  void SolveWeighted(int begin, int end, const FastRows::Geometry& geometry, double noise_scale,
+  void SolveWeighted(int begin, int end, const PixelGeometry& geometry, double noise_scale,
                      NormalField& field, std::span<float> misfits, SolveSummary& counts) const;
   // Equation (5) of sample.pixels, in order of their indices and inside the mask.
   void FindMisfits(MisfitSample& sample) const;

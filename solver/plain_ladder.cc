@@ -176,13 +176,11 @@ PlainSearch SearchPlain(const PixelSystem& system, const Eigen::Vector3d& w) {
 PlainAnswer PlainWeighted(const PixelSystem& system, const StackNoise& noise) {
   const auto l = system.L();
   const Eigen::Matrix3d first = l.transpose() * l;
-  const Eigen::Matrix<double, 3, 4> n0 = first.ldlt().solve(l.transpose() * system.Rhs());
-  const Eigen::Vector3d n = n0.col(3);
+  const Eigen::Vector3d n = first.ldlt().solve(l.transpose() * system.Rhs().col(3));
   PlainAnswer answer;
-  answer.n_rgb = n0.leftCols<3>();
   answer.residual = (system.Rhs().col(3) - l * n).norm() / std::sqrt(system.Count());
-  const Eigen::Array3d b =
-      (answer.n_rgb.transpose() * n / n.squaredNorm()).cwiseMax(0.0).array();    // (2)
+  const Eigen::Vector4d sum = system.Rhs().colwise().sum().transpose();
+  const Eigen::Array3d b = sum.head<3>().array().max(0.0) / sum[3];              // (2)
   const auto variances = [&](Eigen::Index k, double bright) -> Eigen::Array3d {  // (1)
     const SampleNoise& of_frame = noise[static_cast<size_t>(system.FrameOf(k))];
     const Eigen::Array3d f = 1.0 / system.E().row(k).transpose().array();
@@ -210,6 +208,7 @@ PlainAnswer PlainWeighted(const PixelSystem& system, const StackNoise& noise) {
     return answer;
   }
   answer.n = n + step;                                                                       // (4)
+  answer.albedo = b * answer.n.norm();
   answer.uncertainty_deg = std::sqrt(AngularVarianceOf(covariance, answer.n)) * kDegPerRad;  // (4)
   if (system.Count() > 3) {
     answer.misfit = std::max(0.0, chi_squared - gradient.dot(step)) / (system.Count() - 3);  // (5)
@@ -235,10 +234,11 @@ PlainAnswer PlainConsensus(const PixelSystem& system, double max_condition) {
   Eigen::Vector3d n = search.n;
   PlainSums sums;
   PlainAnswer answer;
+  Eigen::Matrix3d n_rgb;
   for (int step = 0; step < kReweightings; ++step) {  // (10)
     sums = SumsAt(system, ranked, n, /*start=*/false);
-    answer.n_rgb = sums.a.inverse() * sums.b;
-    n = answer.n_rgb * ranked.w;
+    n_rgb = sums.a.inverse() * sums.b;
+    n = n_rgb * ranked.w;
   }
   sums = SumsAt(system, ranked, n, /*start=*/false);
   if (!n.allFinite() || !(ConditionSquared(sums.a) <= max_condition * max_condition)) {
@@ -253,7 +253,7 @@ PlainAnswer PlainConsensus(const PixelSystem& system, double max_condition) {
     answer.agreeing += std::abs(r) <= static_cast<double>(kAgreeing) ? 1 : 0;
   }
   answer.n = ranked.median * n;
-  answer.n_rgb *= ranked.median;
+  answer.albedo = ranked.median * n_rgb.colwise().norm().transpose().array();
   answer.residual = ranked.median * std::sqrt(sums.squares / sums.weights);
   return answer;
 }
@@ -295,7 +295,9 @@ void WeighRowsInDouble(const LightStack& stack, const Rig& rig, const Lambertian
       continue;
     }
     for (size_t c = 0; c < 3; ++c) {
-      field.normal[c].pixels[pixel] = static_cast<float>(n[static_cast<Eigen::Index>(c)]);
+      const auto column = static_cast<Eigen::Index>(c);
+      field.normal[c].pixels[pixel] = static_cast<float>(n[column]);
+      field.albedo[c].pixels[pixel] = static_cast<float>(answer.albedo[column]);
     }
     // In this order the minimum of 180 and not-a-number, of an infinite scale, is 180.
     field.uncertainty.pixels[pixel] =

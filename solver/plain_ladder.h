@@ -13,7 +13,7 @@ namespace sateen {
 // fast kernel is tested against, and what solves the pixels that it refuses.
 struct PlainAnswer {
   Eigen::Vector3d n = Eigen::Vector3d::Zero();  // N, of luminance; zero: no answer
-  Eigen::Matrix3d n_rgb = Eigen::Matrix3d::Zero();
+  Eigen::Array3d albedo = Eigen::Array3d::Zero();
   double residual = 0.0;
   double uncertainty_deg = 0.0;
   double misfit = 0.0;  // rung 1 alone
