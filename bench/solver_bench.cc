@@ -73,6 +73,7 @@ void BM_WeightedRows(benchmark::State& state, LightModel model) {
   NormalField field;
   field.Resize(kSize);
   field.uncertainty = Image<float>(kSize);
+  field.albedo_uncertainty = Image<float>(kSize);
   field.model = Image<uint8_t>(kSize);
   const int step = RowsPerPiece(kSize);
   std::vector<float> misfits(static_cast<size_t>(step) * static_cast<size_t>(kSize.width));

@@ -86,6 +86,7 @@ Result<MapsWriter> MapsWriter::Begin(ImageSize size_px, const MapsOptions& optio
   open(uint8_t(), "samples.png", 1, true, writer.samples_);
   open(uint8_t(), "reason.png", 1, true, writer.reason_);
   open(float(), "uncertainty.exr", 1, options.has_ladder, writer.uncertainty_);
+  open(float(), "albedo_uncertainty.exr", 1, options.has_ladder, writer.albedo_uncertainty_);
   open(uint8_t(), "model.png", 1, options.has_ladder, writer.model_);
   open(float(), "error.exr", 1, options.has_error, writer.error_);
   return status ? Result<MapsWriter>(std::move(writer)) : tl::unexpected(status.error());
@@ -103,9 +104,9 @@ Status MapsWriter::Add(const NormalField& band, const Image<float>* angular_erro
                       .and_then([&] { return samples_->Write(One(band.samples)); })
                       .and_then([&] { return reason_->Write(One(band.reason)); });
   if (status && uncertainty_) {
-    status = uncertainty_->Write(One(band.uncertainty)).and_then([&] {
-      return model_->Write(One(band.model));
-    });
+    status = uncertainty_->Write(One(band.uncertainty))
+                 .and_then([&] { return albedo_uncertainty_->Write(One(band.albedo_uncertainty)); })
+                 .and_then([&] { return model_->Write(One(band.model)); });
   }
   if (status && error_) {
     status = error_->Write(One(*angular_error_deg));
@@ -122,7 +123,8 @@ Status MapsWriter::Add(const NormalField& band, const Image<float>* angular_erro
 Status MapsWriter::Finish(const Image3& first_frame, OutputFolder& folder) {
   Status status;
   for (std::optional<BandWriter>* file : {&normal_, &normal_png_, &albedo_, &residual_, &samples_,
-                                          &reason_, &uncertainty_, &model_, &error_}) {
+                                          &reason_, &uncertainty_, &albedo_uncertainty_, &model_,
+                                          &error_}) {
     if (status && *file) {
       status = (*file)->Close();
     }

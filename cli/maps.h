@@ -17,13 +17,13 @@ inline constexpr int kOverviewPanelWidthPx = 640;
 
 struct MapsOptions {
   bool normal_y_down = false;  // the DirectX convention instead of OpenGL's
-  bool has_ladder = false;     // uncertainty.exr and model.png, too
+  bool has_ladder = false;     // uncertainty.exr, albedo_uncertainty.exr and model.png, too
   bool has_error = false;      // error.exr, too
 };
 
 /// Stages the maps of a solve, band by band from the top: normal.exr and .png, albedo.exr,
-/// residual.exr, samples.png, reason.png, of a ladder uncertainty.exr and model.png, the angular error
-/// as error.exr, and at the end overview.png: a frame, the normals, the albedo, and the error or,
+/// residual.exr, samples.png, reason.png, of a ladder uncertainty.exr, albedo_uncertainty.exr and model.png,
+/// the angular error as error.exr, and at the end overview.png: a frame, the normals, the albedo, and the error or,
 /// without truth, the residual. The same files for the same maps, however they are cut.
 class MapsWriter {
  public:
@@ -48,6 +48,7 @@ class MapsWriter {
   std::optional<BandWriter> samples_;
   std::optional<BandWriter> reason_;
   std::optional<BandWriter> uncertainty_;
+  std::optional<BandWriter> albedo_uncertainty_;
   std::optional<BandWriter> model_;
   std::optional<BandWriter> error_;
   Thumbnail small_normal_;

@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "core/angle.h"
-#include "imaging/color.h"
 #include "solver/consensus.h"
 #include "solver/noise.h"
 #include "solver/plain_ladder.h"
@@ -36,11 +35,8 @@ bool NeedsConsensus(const Climb& climb, const NormalField& field, float misfit, 
   if (misfit <= climb.limit[field.samples.pixels[pixel]]) {
     return false;
   }
-  const float albedo = kLuminance[0] * field.albedo[0].pixels[pixel] +
-                       kLuminance[1] * field.albedo[1].pixels[pixel] +
-                       kLuminance[2] * field.albedo[2].pixels[pixel];
   return field.residual.pixels[pixel] >
-         static_cast<float>(climb.options.explained_residual) * albedo;
+         static_cast<float>(climb.options.explained_residual) * AlbedoAt(field, pixel);
 }
 
 // As FastRows::SolveConsensus, in double.
@@ -64,6 +60,8 @@ void SolveConsensusInDouble(const Climb& climb, std::span<const size_t> pixels, 
     }
     field.residual.pixels[pixel] = static_cast<float>(answer.residual);
     field.uncertainty.pixels[pixel] = static_cast<float>(std::min(answer.uncertainty_deg, 180.0));
+    field.albedo_uncertainty.pixels[pixel] =
+        static_cast<float>(std::min(answer.albedo_uncertainty, 1.0));
     agreeing[j] = static_cast<uint8_t>(std::min(answer.agreeing, 255));
   }
 }
@@ -136,7 +134,8 @@ void FindClimbers(const Climb& climb, std::span<const float> misfits, size_t fir
 void ClimbPixels(const Climb& climb, const ListedPixels& listed, NormalField& field,
                  PieceSummary& summary) {
   const std::vector<size_t>& pixels = listed.pixels;
-  const std::vector<Eigen::Vector3f> before = NormalsAt(field, pixels);
+  const auto albedo = [&](size_t pixel) { return AlbedoAt(field, pixel); };
+  const std::vector<Estimate> before = EstimatesAt(field, pixels, albedo);
   std::vector<uint8_t> agreeing(pixels.size());
   if (const FastRows* fast = climb.rows.Fast(); fast != nullptr) {
     fast->SolveConsensus(listed, field, agreeing);
@@ -146,7 +145,7 @@ void ClimbPixels(const Climb& climb, const ListedPixels& listed, NormalField& fi
   } else {
     SolveConsensusInDouble(climb, pixels, field, agreeing);
   }
-  JudgeConsensus(pixels, before, agreeing, field, summary);
+  JudgeConsensus(pixels, before, EstimatesAt(field, pixels, albedo), agreeing, field, summary);
 }
 
 // Rung 3 for those of `count` pixels that the scene's sheen explains, also where rung 1 does so by chance.
@@ -177,8 +176,7 @@ void SolveUnderSheen(const Climb& climb, size_t first, size_t count, NormalField
       field.albedo[c].pixels[pixel] = static_cast<float>(answer.albedo[column_of]);
     }
     field.residual.pixels[pixel] = static_cast<float>(answer.residual);
-    field.uncertainty.pixels[pixel] = static_cast<float>(
-        std::min(180.0, std::hypot(answer.uncertainty_deg * noise_scale, kSheenUncertaintyDeg)));
+    StoreSheenUncertainty(answer, noise_scale, field, pixel);
     field.model.pixels[pixel] = static_cast<uint8_t>(Rung::kSheen);
     summary.sheen_deg += static_cast<double>(field.uncertainty.pixels[pixel]);
     ++summary.sheen;

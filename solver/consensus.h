@@ -33,11 +33,11 @@ inline constexpr float kAgreeing = 0.1F;
 inline constexpr int kFewestAgreeing = 4;
 // (11): the spread of the samples tells of the model's error only in part.
 inline constexpr float kUncertaintyFactor = 4.0F;
-inline constexpr float kLeastModelUncertaintyDeg = 3.0F;
-// (12): of the angle between two estimates that disagree, so much is doubt about the better one.
+inline constexpr float kLeastModelUncertainty = 0.0523598776F;  // 3 degrees
+// (12): of what two estimates differ by, so much is doubt about the better one.
 inline constexpr float kUncertaintyOfTurn = 0.4F;
 
-// What a cloth differs by from the sheen it is given.
-inline constexpr double kSheenUncertaintyDeg = 0.5;
+// What a cloth differs by from the sheen it is given: half a degree.
+inline constexpr double kSheenUncertainty = 0.00872664626;
 
 }  // namespace sateen

@@ -165,15 +165,13 @@ HWY_INLINE Reweighted Reweigh(const Samples& samples, const Band& band, V invers
   return sums;
 }
 
-HWY_INLINE V ConsensusUncertaintyDeg(const Reweighted& sums, const Inverse& inverse,
-                                     const Vector3& n) {
+// (11), of a variance of VariancesOf().
+HWY_INLINE V SpreadOf(V variance, const Reweighted& sums) {
   const D d;
   const V freedom = hn::Max(hn::Sub(sums.weights, hn::Set(d, 3.0F)), hn::Set(d, 1.0F));
-  const V angle =
-      hn::Mul(hn::Sqrt(hn::Div(hn::Mul(AngularVariance(inverse.a, n), sums.squares), freedom)),
-              hn::Set(d, kUncertaintyFactor * kDegreesPerRadian));
-  return hn::Sqrt(
-      hn::MulAdd(angle, angle, hn::Set(d, kLeastModelUncertaintyDeg * kLeastModelUncertaintyDeg)));
+  const V spread = hn::Div(hn::Mul(variance, sums.squares), freedom);
+  return hn::Sqrt(hn::MulAdd(hn::Set(d, kUncertaintyFactor * kUncertaintyFactor), spread,
+                             hn::Set(d, kLeastModelUncertainty * kLeastModelUncertainty)));
 }
 
 HWY_INLINE void StoreConsensus(const Reweighted& sums, const Vector3* n_rgb, const Vector3& n,
@@ -194,7 +192,10 @@ HWY_INLINE void StoreConsensus(const Reweighted& sums, const Vector3* n_rgb, con
   }
   const V mean = hn::Div(sums.squares, hn::Max(sums.weights, hn::Set(d, 1e-6F)));
   store(ScaleDown(hn::Mul(hn::Sqrt(mean), unit), scale), output.residual);
-  store(ConsensusUncertaintyDeg(sums, inverse, n), output.uncertainty);
+  const Variances variances = VariancesOf(inverse.a, n);
+  store(hn::Mul(SpreadOf(variances.angular, sums), hn::Set(d, kDegreesPerRadian)),
+        output.uncertainty);
+  store(SpreadOf(variances.albedo, sums), output.albedo_uncertainty);
   const auto bits = hn::RebindMask(di, solved);
   StoreBytes(hn::IfThenElseZero(bits, hn::Min(hn::ConvertTo(di, sums.agreeing), hn::Set(di, 255))),
              output.agreeing + offset);

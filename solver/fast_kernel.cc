@@ -119,6 +119,8 @@ HWY_INLINE void SolveVector(const KernelParams& params, const KernelInput& input
         hn::Mul(weighted.uncertainty_deg, hn::Set(d, input.noise_scale));  // not a number: unknown
     const V unknown = hn::Set(d, 180.0F);
     store(hn::IfThenElse(hn::Lt(uncertainty, unknown), uncertainty, unknown), output.uncertainty);
+    const V of_albedo = hn::Mul(weighted.albedo_uncertainty, hn::Set(d, input.noise_scale));
+    store(hn::IfThenElse(hn::Lt(of_albedo, one), of_albedo, one), output.albedo_uncertainty);
     store(weighted.misfit, output.misfit);
     const M unchecked = hn::Le(answer.count, hn::Set(d, 3.0F));
     const VI rung = hn::IfThenElse(hn::RebindMask(di, unchecked),

@@ -54,7 +54,8 @@ struct KernelOutput {
   uint8_t* samples = nullptr;
   uint8_t* reason = nullptr;
   // SolveWeightedSpan and SolveConsensusSpan.
-  float* uncertainty = nullptr;  // degrees
+  float* uncertainty = nullptr;         // degrees
+  float* albedo_uncertainty = nullptr;  // of 1
   // SolveWeightedSpan: chi^2 over its degrees of freedom, 0 where there is none, and the rung.
   float* misfit = nullptr;
   uint8_t* model = nullptr;
@@ -80,12 +81,12 @@ inline constexpr float kFloatConditionSquared = 400.0F;
 void SolveSpan(const KernelParams& params, const KernelInput& input, const KernelOutput& output);
 
 /// The same, then one step to the normal that has the samples' noise for weights (equations (1) to
-/// (5) of solver/ladder.h); `uncertainty`, `misfit` and `model` must be there. Costs 1.5 times SolveSpan.
+/// (5) of solver/ladder.h); `misfit`, `model` and both uncertainties must be there. Costs 1.5 times SolveSpan.
 void SolveWeightedSpan(const KernelParams& params, const KernelInput& input,
                        const KernelOutput& output);
 
 /// Equations (6) to (11) of solver/ladder.h, for pixels that least squares do not explain.
-/// `uncertainty` and `agreeing` must be there, `misfit` is not touched; pixels without an answer
+/// `agreeing` and both uncertainties must be there, `misfit` is not touched; pixels without an answer
 /// are not kSolved. x_mm and y_mm must be there, also for distant lights.
 void SolveConsensusSpan(const KernelParams& params, const KernelInput& input,
                         const KernelOutput& output);

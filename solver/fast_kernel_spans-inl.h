@@ -26,6 +26,7 @@ HWY_INLINE void StoreUnsolved(size_t offset, const KernelOutput& output) {
   hn::StoreU(hn::Zero(d), d, output.residual + offset);
   if (output.uncertainty != nullptr) {
     hn::StoreU(hn::Zero(d), d, output.uncertainty + offset);
+    hn::StoreU(hn::Zero(d), d, output.albedo_uncertainty + offset);
     hn::StoreU(hn::Zero(d), d, output.misfit + offset);
     StoreBytes(hn::Zero(DI()), output.model + offset);
   }
@@ -92,18 +93,19 @@ HWY_INLINE void ForEachVector(const KernelParams& params, const KernelInput& inp
     std::copy_n(input.mask + whole, rest, bytes.begin());
   }
   tail.mask = bytes.data();
-  std::vector<float> results(9 * lanes);
+  std::vector<float> results(10 * lanes);
   const auto result = [&](size_t index) { return results.data() + index * lanes; };
   solve(tail, 0,
-        KernelOutput{{result(0), result(1), result(2)},
-                     {result(3), result(4), result(5)},
-                     result(6),
-                     bytes.data() + lanes,
-                     bytes.data() + 2 * lanes,
-                     result(7),
-                     result(8),
-                     bytes.data() + 4 * lanes,
-                     bytes.data() + 3 * lanes});
+        KernelOutput{.normal = {result(0), result(1), result(2)},
+                     .albedo = {result(3), result(4), result(5)},
+                     .residual = result(6),
+                     .samples = bytes.data() + lanes,
+                     .reason = bytes.data() + 2 * lanes,
+                     .uncertainty = result(7),
+                     .albedo_uncertainty = result(9),
+                     .misfit = result(8),
+                     .model = bytes.data() + 4 * lanes,
+                     .agreeing = bytes.data() + 3 * lanes});
   for (size_t c = 0; c < 3; ++c) {
     std::copy_n(result(c), rest, output.normal[c] + whole);
     std::copy_n(result(3 + c), rest, output.albedo[c] + whole);
@@ -111,6 +113,7 @@ HWY_INLINE void ForEachVector(const KernelParams& params, const KernelInput& inp
   std::copy_n(result(6), rest, output.residual + whole);
   if (output.uncertainty != nullptr) {
     std::copy_n(result(7), rest, output.uncertainty + whole);
+    std::copy_n(result(9), rest, output.albedo_uncertainty + whole);
   }
   if (output.misfit != nullptr) {
     std::copy_n(result(8), rest, output.misfit + whole);

@@ -66,7 +66,7 @@ HWY_INLINE V ReciprocalOf(V v) {
 #endif
 }
 
-// 1 / v to some 3e-4, for weights and uncertainties.
+// 1 / v and the root of v to some 3e-4, for weights and uncertainties.
 HWY_INLINE V RoughReciprocalOf(V v) {
 #if HWY_ARCH_X86
   return hn::ApproximateReciprocal(v);
@@ -83,6 +83,14 @@ HWY_INLINE V ReciprocalRootOf(V v) {
   return hn::MulAdd(guess, hn::NegMulAdd(half, guess, hn::Set(d, 0.5F)), guess);
 #else
   return hn::Div(hn::Set(d, 1.0F), hn::Sqrt(v));
+#endif
+}
+
+HWY_INLINE V RoughRootOf(V v) {
+#if HWY_ARCH_X86
+  return hn::Mul(v, hn::ApproximateReciprocalSqrt(hn::Max(v, hn::Set(D(), 1e-37F))));
+#else
+  return hn::Sqrt(v);
 #endif
 }
 

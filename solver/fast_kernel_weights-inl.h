@@ -33,6 +33,7 @@ struct Weighted {
   Vector3 n;
   V colour[3];  // b_c of (2)
   V uncertainty_deg;
+  V albedo_uncertainty;
   V misfit;
   V sum_of_squares;  // of the luminance's residuals, as ResidualOf has it
   V count;
@@ -70,13 +71,20 @@ HWY_INLINE StartEquations AccumulateStart(const KernelParams& params, const floa
   return eq;
 }
 
-// Variance of N / |N| across N, as an angle: (tr C - n C n) / |N|^2.
-HWY_INLINE V AngularVariance(const Symmetric3& c, const Vector3& n) {
+// Variances of a solution.
+struct Variances {
+  V angular;  // of N / |N|, as an angle: (tr C - n C n) / |N|^2
+  V albedo;   // of |N|, over its square: n C n / |N|^2
+};
+
+HWY_INLINE Variances VariancesOf(const Symmetric3& c, const Vector3& n) {
   const D d;
   const V inverse = RoughReciprocalOf(hn::Max(Dot(n, n), hn::Set(d, 1e-37F)));
   const V trace = hn::Add(c.xx, hn::Add(c.yy, c.zz));
-  const V across = hn::NegMulAdd(Dot(n, Times(c, n)), inverse, trace);
-  return hn::Mul(hn::Max(across, hn::Zero(d)), inverse);
+  const V along = hn::Mul(Dot(n, Times(c, n)), inverse);
+  const V across = hn::Sub(trace, along);
+  return {hn::Mul(hn::Max(across, hn::Zero(d)), inverse),
+          hn::Mul(hn::Max(along, hn::Zero(d)), inverse)};
 }
 
 HWY_INLINE void AddOuter(const Vector3& l, V weight, Symmetric3& sum) {
@@ -265,9 +273,10 @@ HWY_INLINE Weighted SolveWeighted(const KernelParams& params, float* scratch, V 
       hn::Gt(freedom, zero),
       hn::Mul(chi_squared, hn::Mul(ReciprocalOfPower(units.reference),
                                    RoughReciprocalOf(hn::Max(freedom, hn::Set(d, 1.0F))))));  // (5)
-  weighted.uncertainty_deg =
-      hn::Mul(RootOf(hn::Mul(AngularVariance(inverse.a, weighted.n), units.reference)),
-              hn::Set(d, kDegreesPerRadian));  // (4)
+  const Variances variances = VariancesOf(inverse.a, weighted.n);  // (4)
+  weighted.uncertainty_deg = hn::Mul(RoughRootOf(hn::Mul(variances.angular, units.reference)),
+                                     hn::Set(d, kDegreesPerRadian));
+  weighted.albedo_uncertainty = RoughRootOf(hn::Mul(variances.albedo, units.reference));
   weighted.count = start.count;
   weighted.accepted = hn::And(first.accepted, inverse.accepted);
   return weighted;

@@ -169,6 +169,7 @@ void FastRows::Run(SpanFunction function, int begin, int end, const PixelGeometr
             .samples = at(field.samples),
             .reason = at(field.reason),
             .uncertainty = misfits != nullptr ? at(field.uncertainty) : nullptr,
+            .albedo_uncertainty = misfits != nullptr ? at(field.albedo_uncertainty) : nullptr,
             .misfit = misfits,
             .model = misfits != nullptr ? at(field.model) : nullptr});
 }
@@ -237,7 +238,7 @@ void FastRows::MisfitsAt(std::span<const size_t> pixels, std::span<float> misfit
     listed.Append(GeometryOf(v, v + 1), row * width, pixels.subspan(begin, end - begin));
     begin = end;
   }
-  std::vector<float> results(8 * pixels.size());
+  std::vector<float> results(9 * pixels.size());
   std::vector<uint8_t> models(pixels.size());
   const auto result = [&](size_t index) { return results.data() + index * pixels.size(); };
   const bool has_positions = grid_.has_value();  // else the kernel for distant lights
@@ -248,6 +249,7 @@ void FastRows::MisfitsAt(std::span<const size_t> pixels, std::span<float> misfit
              .samples = samples.data(),
              .reason = reasons.data(),
              .uncertainty = result(7),
+             .albedo_uncertainty = result(8),
              .misfit = misfits.data(),
              .model = models.data()});
 }
@@ -255,7 +257,7 @@ void FastRows::MisfitsAt(std::span<const size_t> pixels, std::span<float> misfit
 void FastRows::SolveConsensus(const ListedPixels& listed, NormalField& field,
                               std::span<uint8_t> agreeing) const {
   const size_t count = listed.pixels.size();
-  std::vector<float> results(8 * count);
+  std::vector<float> results(9 * count);
   std::vector<uint8_t> bytes(2 * count);
   const auto result = [&](size_t index) { return results.data() + index * count; };
   RunListed(SolveConsensusSpan, listed, true,
@@ -265,6 +267,7 @@ void FastRows::SolveConsensus(const ListedPixels& listed, NormalField& field,
              .samples = bytes.data(),
              .reason = bytes.data() + count,
              .uncertainty = result(7),
+             .albedo_uncertainty = result(8),
              .agreeing = agreeing.data()});
   for (size_t j = 0; j < count; ++j) {
     if (bytes[count + j] != static_cast<uint8_t>(Reason::kSolved)) {
@@ -278,6 +281,7 @@ void FastRows::SolveConsensus(const ListedPixels& listed, NormalField& field,
     }
     field.residual.pixels[pixel] = result(6)[j];
     field.uncertainty.pixels[pixel] = result(7)[j];
+    field.albedo_uncertainty.pixels[pixel] = result(8)[j];
   }
 }
 

@@ -43,9 +43,8 @@ Status DoubtLeastSquares(const Doubt& doubt, const Task& task, NormalField& fiel
         for (size_t p = field.model.Index(0, begin); p < field.model.Index(0, end); ++p) {
           const auto rung = static_cast<Rung>(field.model.pixels[p]);
           if (rung == Rung::kLeastSquares || rung == Rung::kUnchecked) {
-            float& uncertainty = field.uncertainty.pixels[p];
-            uncertainty = doubt.Of(uncertainty, rung);
-            sums[static_cast<size_t>(begin)] += static_cast<double>(uncertainty);
+            doubt.AddTo(field, p);
+            sums[static_cast<size_t>(begin)] += static_cast<double>(field.uncertainty.pixels[p]);
           }
         }
       });
@@ -56,22 +55,18 @@ Status DoubtLeastSquares(const Doubt& doubt, const Task& task, NormalField& fiel
   return status;
 }
 
-// |n(-1) - 2 n + n(+1)|^2 of neighbours `step` apart; one that is unsolved or beyond the border is as far
-// from n as the other.
-float SquaredBendAt(const NormalField& field, size_t p, size_t step, bool has_before,
+// |f(-1) - 2 f + f(+1)|^2 of neighbours `step` apart; one that is unsolved or beyond the border is as far
+// from f as the other.
+template <typename At>
+float SquaredBendAt(const NormalField& field, const At& f, size_t p, size_t step, bool has_before,
                     bool has_after) {
-  const auto normal_at = [&](size_t q) {
-    return Eigen::Vector3f(field.normal[0].pixels[q], field.normal[1].pixels[q],
-                           field.normal[2].pixels[q]);
-  };
   const bool before = has_before && IsSolved(field, p - step);
   const bool after = has_after && IsSolved(field, p + step);
-  const Eigen::Vector3f n = normal_at(p);
   if (before && after) {
-    return (normal_at(p - step) - 2.0F * n + normal_at(p + step)).squaredNorm();
+    return (f(p - step) - 2.0F * f(p) + f(p + step)).squaredNorm();
   }
-  return before  ? 4.0F * (normal_at(p - step) - n).squaredNorm()
-         : after ? 4.0F * (normal_at(p + step) - n).squaredNorm()
+  return before  ? 4.0F * (f(p - step) - f(p)).squaredNorm()
+         : after ? 4.0F * (f(p + step) - f(p)).squaredNorm()
                  : 0.0F;
 }
 
@@ -81,6 +76,13 @@ Status DoubtInterpolation(const Task& task, NormalField& field, PieceSummary& to
   const auto width = static_cast<size_t>(size.width);
   std::vector<PieceSummary> rows(static_cast<size_t>(size.height));
   const Task silent{.threads = task.threads, .cancel = task.cancel};
+  const auto normal_at = [&](size_t p) {
+    return Eigen::Vector3f(field.normal[0].pixels[p], field.normal[1].pixels[p],
+                           field.normal[2].pixels[p]);
+  };
+  const auto albedo_at = [&](size_t p) {
+    return Eigen::Matrix<float, 1, 1>(AlbedoAt(field, p));
+  };
   Status status = ParallelFor(size.height, RowsPerPiece(size), silent, [&](int begin, int end) {
     for (int row = begin; row < end; ++row) {
       PieceSummary& sums = rows[static_cast<size_t>(row)];
@@ -89,11 +91,19 @@ Status DoubtInterpolation(const Task& task, NormalField& field, PieceSummary& to
         if (!IsSolved(field, p)) {
           continue;
         }
-        const float bend_squared = SquaredBendAt(field, p, 1, x > 0, x + 1 < width) +
-                                   SquaredBendAt(field, p, width, row > 0, row + 1 < size.height);
+        const auto bend_of = [&](const auto& f) {
+          return SquaredBendAt(field, f, p, 1, x > 0, x + 1 < width) +
+                 SquaredBendAt(field, f, p, width, row > 0, row + 1 < size.height);
+        };
         float& uncertainty = field.uncertainty.pixels[p];
-        uncertainty = std::min(
-            180.0F, std::sqrt(uncertainty * uncertainty + kQuarterSquareDegree * bend_squared));
+        uncertainty = std::min(180.0F, std::sqrt(uncertainty * uncertainty +
+                                                 kQuarterSquareDegree * bend_of(normal_at)));
+        const float albedo = albedo_at(p).x();
+        float& of_albedo = field.albedo_uncertainty.pixels[p];
+        of_albedo = albedo > 0.0F
+                        ? std::min(1.0F, std::sqrt(of_albedo * of_albedo +
+                                                   0.25F * bend_of(albedo_at) / (albedo * albedo)))
+                        : 1.0F;
         const auto rung = static_cast<Rung>(field.model.pixels[p]);
         double& sum = rung <= Rung::kUnchecked ? sums.least_squares_deg
                       : rung == Rung::kSheen   ? sums.sheen_deg
@@ -197,6 +207,7 @@ Status SolveLadderInto(const LightStack& stack, const Rig& rig, const std::optio
   field.Resize(size);
   if (field.model.Size() != size) {
     field.uncertainty = Image<float>(size);
+    field.albedo_uncertainty = Image<float>(size);
     field.model = Image<uint8_t>(size);
   }
   field.summary = {};

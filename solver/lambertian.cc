@@ -93,6 +93,7 @@ Status SolveLambertianInto(const LightStack& stack, const Rig& rig, const std::o
   }
   field.Resize(stack[0].rgb.Size());
   field.uncertainty = {};
+  field.albedo_uncertainty = {};
   field.model = {};
   field.summary = {};
   if (Status status = SolveAllRows(*rows, task, field); !status) {

@@ -104,7 +104,8 @@ struct NormalField {
   Image<uint8_t> samples;  // usable samples, 255 = 255 or more
   Image<uint8_t> reason;   // of type Reason
   // SolveLadder alone; SolveLambertian leaves them empty.
-  Image<float> uncertainty;  // degrees, one standard deviation of the normal's angle
+  Image<float> uncertainty;         // degrees, one standard deviation of the normal's angle
+  Image<float> albedo_uncertainty;  // standard deviation of the albedo's luminance over itself, at most 1
   Image<uint8_t> model;      // of type Rung
   SolveSummary summary;
 

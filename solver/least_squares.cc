@@ -114,6 +114,7 @@ void ClearRows(const std::optional<Mask>& mask, int row_begin, int row_end, Norm
     field.residual.pixels[p] = 0.0F;
     if (!field.model.pixels.empty()) {  // of a ladder
       field.uncertainty.pixels[p] = 0.0F;
+      field.albedo_uncertainty.pixels[p] = 0.0F;
       field.model.pixels[p] = static_cast<uint8_t>(Rung::kNone);
     }
     field.samples.pixels[p] = 0;

@@ -10,6 +10,7 @@ namespace sateen {
 namespace {
 
 constexpr int kTile = 64;  // pixels
+constexpr auto kSquareDegrees = static_cast<float>(kDegPerRad * kDegPerRad);
 
 struct LightErrors {
   double direction = 0.0;   // sd(delta)^2, in radians
@@ -70,8 +71,7 @@ std::optional<LightDoubt> LightDoubt::Make(const Rig& rig, ImageSize size) {
     for (int column = 0; column < doubt.columns_; ++column) {
       const Eigen::Matrix3d q =
           QAt(rig.lights, PlaceOf(rig, std::min((column + 0.5) * kTile, size.width - 1.0),
-                                  std::min((row + 0.5) * kTile, size.height - 1.0))) *
-          (kDegPerRad * kDegPerRad);
+                                  std::min((row + 0.5) * kTile, size.height - 1.0)));
       doubt.tiles_.push_back({static_cast<float>(q(0, 0)), static_cast<float>(q(1, 1)),
                               static_cast<float>(q(2, 2)), static_cast<float>(q(0, 1)),
                               static_cast<float>(q(0, 2)), static_cast<float>(q(1, 2))});
@@ -94,9 +94,11 @@ void LightDoubt::AddToRow(int row, size_t first, NormalField& field) const {
     const float z = field.normal[2].pixels[p];
     const float along =
         xx * x * x + yy * y * y + zz * z * z + 2.0F * (xy * x * y + xz * x * z + yz * y * z);
+    const float across = std::max(0.0F, xx + yy + zz - along);  // (3)
     float& uncertainty = field.uncertainty.pixels[p];
-    uncertainty = std::min(180.0F, std::sqrt(uncertainty * uncertainty +
-                                             std::max(0.0F, xx + yy + zz - along)));  // (3)
+    uncertainty = std::min(180.0F, std::sqrt(uncertainty * uncertainty + kSquareDegrees * across));
+    float& of_albedo = field.albedo_uncertainty.pixels[p];
+    of_albedo = std::min(1.0F, std::sqrt(of_albedo * of_albedo + std::max(0.0F, along)));
   }
 }
 

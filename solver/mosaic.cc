@@ -36,6 +36,7 @@ void ResizeMaps(ImageSize size, bool with_ladder, NormalField& field) {
   const ImageSize ladder_size = with_ladder ? size : ImageSize{};
   if (field.model.Size() != ladder_size) {
     field.uncertainty = Image<float>(ladder_size);
+    field.albedo_uncertainty = Image<float>(ladder_size);
     field.model = Image<uint8_t>(ladder_size);
   }
 }

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <limits>
 
+#include "core/angle.h"
 #include "solver/consensus.h"
 #include "solver/mosaic_feed.h"
 
@@ -15,15 +16,15 @@ constexpr float kColourAdvantage = 0.5F;
 
 // What the search knows of the spread of its samples, in degrees (solver/ladder.h, (11)).
 float SpreadOf(float uncertainty_deg) {
-  return std::sqrt(std::max(0.0F, uncertainty_deg * uncertainty_deg -
-                                      kLeastModelUncertaintyDeg * kLeastModelUncertaintyDeg));
+  constexpr auto kLeastDeg = kLeastModelUncertainty * static_cast<float>(kDegPerRad);
+  return std::sqrt(std::max(0.0F, uncertainty_deg * uncertainty_deg - kLeastDeg * kLeastDeg));
 }
 
 }  // namespace
 
 // Answers of the search, one entry a site.
 struct MosaicFeed::Consensus {
-  std::vector<float> results;  // normal, albedo of each colour, residual, uncertainty
+  std::vector<float> results;  // normal, albedo of each colour, residual, both uncertainties
   std::vector<uint8_t> bytes;  // samples, reason, agreeing
   size_t count = 0;
 
@@ -101,7 +102,7 @@ MosaicFeed::Consensus MosaicFeed::Search(const MosaicPiece& piece, std::span<con
   }
   const float* const x_mm = column([&](size_t at) { return grid_ ? piece.x_mm_[at] : 0.0F; });
   const float* const y_mm = column([&](size_t at) { return grid_ ? piece.y_mm_[at] : 0.0F; });
-  Consensus found{.results = std::vector<float>(8 * count),
+  Consensus found{.results = std::vector<float>(9 * count),
                   .bytes = std::vector<uint8_t>(3 * count),
                   .count = count};
   SolveConsensusSpan(consensus_,
@@ -116,6 +117,7 @@ MosaicFeed::Consensus MosaicFeed::Search(const MosaicPiece& piece, std::span<con
                       .samples = found.Byte(0),
                       .reason = found.Byte(1),
                       .uncertainty = found.Result(7),
+                      .albedo_uncertainty = found.Result(8),
                       .agreeing = found.Byte(2)});
   return found;
 }
@@ -149,6 +151,7 @@ void MosaicFeed::SolveConsensus(const MosaicPiece& piece, std::span<const size_t
     rows.OwnColour(sites[j]) = found.Result(3 + stack_->cfa[y % 2 * 2 + x % 2])[j];
     field.residual.pixels[sites[j]] = found.Result(6)[j];
     field.uncertainty.pixels[sites[j]] = found.Result(7)[j];
+    field.albedo_uncertainty.pixels[sites[j]] = found.Result(8)[j];
   }
 }
 

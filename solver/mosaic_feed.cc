@@ -257,6 +257,7 @@ void MosaicFeed::Run(RowFunction function, const MosaicPiece& piece, const Mask*
               .samples = at(field.samples),
               .reason = at(field.reason),
               .uncertainty = params_.weighted ? at(field.uncertainty) : nullptr,
+              .albedo_uncertainty = params_.weighted ? at(field.albedo_uncertainty) : nullptr,
               .misfit = params_.weighted ? &rows.Misfit(to) : nullptr});
   }
 }

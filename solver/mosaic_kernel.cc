@@ -179,6 +179,7 @@ struct SiteAnswer {
   V count;
   V misfit;
   V uncertainty_deg;
+  V albedo_uncertainty;
   M accepted;
 };
 
@@ -193,17 +194,12 @@ HWY_INLINE SiteAnswer PlainLeastSquares(const MosaicKernelParams& params, const 
   V count = zero;
   for (size_t k = 0; k < params.lights.size(); ++k) {
     const Usable u = UsableOf(scratch + k * kMosaicScratch * lanes, threshold);
-    a.xx = hn::MulAdd(u.l.x, u.l.x, a.xx);
-    a.xy = hn::MulAdd(u.l.x, u.l.y, a.xy);
-    a.xz = hn::MulAdd(u.l.x, u.l.z, a.xz);
-    a.yy = hn::MulAdd(u.l.y, u.l.y, a.yy);
-    a.yz = hn::MulAdd(u.l.y, u.l.z, a.yz);
-    a.zz = hn::MulAdd(u.l.z, u.l.z, a.zz);
+    AddSquare(u.l, a);
     AddScaled(u.l, u.i, b);
     count = hn::Add(count, hn::IfThenElseZero(u.is, hn::Set(d, 1.0F)));
   }
   inverse = Invert(a, params.max_condition_squared);
-  return {Times(inverse.a, b), zero, count, zero, zero, inverse.accepted};
+  return {Times(inverse.a, b), zero, count, zero, zero, zero, inverse.accepted};
 }
 
 HWY_INLINE void ResidualStep(const MosaicKernelParams& params, const float* scratch, V threshold,
@@ -242,7 +238,7 @@ HWY_INLINE void WeightedSiteStep(const MosaicKernelParams& params, const RowStat
         hn::Mul(factor, hn::MulAdd(FigureOf(figures, kShot), hn::Max(predicted, least),
                                    hn::Mul(factor, FigureOf(figures, kReadSquared))));
     const V weight = hn::IfThenElseZero(
-        u.is, ReciprocalOf(hn::Clamp(variance, hn::Set(d, 1e-9F), hn::Set(d, 1e9F))));
+        u.is, RoughReciprocalOf(hn::Clamp(variance, hn::Set(d, 1e-9F), hn::Set(d, 1e9F))));
     const V r = hn::Sub(u.i, predicted);
     const V weighted = hn::Mul(weight, r);
     answer.sum_of_squares = hn::MulAdd(r, r, answer.sum_of_squares);
@@ -261,8 +257,10 @@ HWY_INLINE void WeightedSiteStep(const MosaicKernelParams& params, const RowStat
   const V freedom = hn::Sub(answer.count, hn::Set(d, 3.0F));
   answer.misfit = hn::IfThenElseZero(hn::Gt(freedom, zero),
                                      hn::Div(chi_squared, hn::Mul(unit, hn::Max(freedom, one))));
-  answer.uncertainty_deg = hn::Mul(hn::Sqrt(hn::Mul(AngularVariance(inverse.a, answer.n), unit)),
-                                   hn::Set(d, kDegreesPerRadian));
+  const Variances variances = VariancesOf(inverse.a, answer.n);
+  answer.uncertainty_deg =
+      hn::Mul(RoughRootOf(hn::Mul(variances.angular, unit)), hn::Set(d, kDegreesPerRadian));
+  answer.albedo_uncertainty = RoughRootOf(hn::Mul(variances.albedo, unit));
 }
 
 HWY_INLINE VI SiteReason(const Readings& readings, M enough, M accepted) {
@@ -319,6 +317,7 @@ HWY_INLINE void SolveSites(const MosaicKernelParams& params, const MosaicKernelI
   store(hn::Mul(hn::Sqrt(mean), result_scale), output.residual);
   if (params.weighted) {
     store(answer.uncertainty_deg, output.uncertainty);
+    store(hn::Min(answer.albedo_uncertainty, one), output.albedo_uncertainty);
     store(answer.misfit, output.misfit);
   }
   const auto inside_bits = hn::RebindMask(di, inside);

@@ -57,8 +57,10 @@ struct MosaicKernelOutput {
   float* residual = nullptr;
   uint8_t* samples = nullptr;
   uint8_t* reason = nullptr;
-  float* uncertainty = nullptr;  // degrees; with weights alone, may be null without
-  float* misfit = nullptr;       // chi^2 over its degrees of freedom, 0 where there is none
+  // With weights alone, may be null without.
+  float* uncertainty = nullptr;         // degrees
+  float* albedo_uncertainty = nullptr;  // of 1
+  float* misfit = nullptr;              // chi^2 over its degrees of freedom, 0 where there is none
 };
 
 // Sites of a row that fill a vector of any instruction set.

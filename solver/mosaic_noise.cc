@@ -64,6 +64,7 @@ RowTells LookAtRow(const MosaicStack& stack, const MosaicFeed& feed,
   NormalField field;
   field.Resize({stack.size_px.width, 1});
   field.uncertainty = Image<float>(field.reason.Size());
+  field.albedo_uncertainty = Image<float>(field.reason.Size());
   SiteRows rows;
   rows.Begin(row, row + 1, field, row, /*with_ladder=*/true);
   feed.Solve(piece, mask ? &*mask : nullptr, rows);

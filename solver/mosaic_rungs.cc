@@ -46,6 +46,8 @@ int64_t SolveInDouble(const MosaicJob& job, const MosaicPiece& piece, bool all, 
       field.reason.pixels[p] = static_cast<uint8_t>(solution.reason);
       if (job.options.mode) {
         field.uncertainty.pixels[p] = static_cast<float>(std::min(solution.uncertainty_deg, 180.0));
+        field.albedo_uncertainty.pixels[p] =
+            static_cast<float>(std::min(solution.albedo_uncertainty, 1.0));
         rows.Misfit(p) = static_cast<float>(solution.misfit);
       }
       ++solved;
@@ -92,8 +94,7 @@ void SolveSitesUnderSheen(const MosaicJob& job, const MosaicPiece& piece, SiteRo
       }
       rows.OwnColour(p) = static_cast<float>(answer.albedo[0]);
       field.residual.pixels[p] = static_cast<float>(answer.residual);
-      field.uncertainty.pixels[p] = static_cast<float>(
-          std::min(180.0, std::hypot(answer.uncertainty_deg, kSheenUncertaintyDeg)));
+      StoreSheenUncertainty(answer, 1.0, field, p);
       field.model.pixels[p] = static_cast<uint8_t>(Rung::kSheen);
       summary.sheen_deg += static_cast<double>(field.uncertainty.pixels[p]);
       ++summary.sheen;
@@ -117,7 +118,7 @@ void ClimbSites(const MosaicJob& job, const MosaicPiece& piece, SiteRows& rows,
   }
   for (size_t p = begin; p < end; ++p) {
     if (!IsSolved(field, p)) {
-      field.uncertainty.pixels[p] = 0.0F;
+      field.uncertainty.pixels[p] = field.albedo_uncertainty.pixels[p] = 0.0F;
       continue;
     }
     if (field.model.pixels[p] == static_cast<uint8_t>(Rung::kSheen)) {
@@ -130,17 +131,21 @@ void ClimbSites(const MosaicJob& job, const MosaicPiece& piece, SiteRows& rows,
       continue;
     }
     float& uncertainty = field.uncertainty.pixels[p];
-    uncertainty =
-        job.doubt.IsNone() ? std::min(180.0F, uncertainty) : job.doubt.Of(uncertainty, rung);
+    if (job.doubt.IsNone()) {
+      uncertainty = std::min(180.0F, uncertainty);
+    } else {
+      job.doubt.AddTo(field, p);
+    }
     summary.least_squares_deg += static_cast<double>(uncertainty);
     ++(rung == Rung::kUnchecked ? summary.unchecked : summary.least_squares);
   }
   if (!sites.empty()) {
     summary.climbing_seconds += SecondsOf([&] {
-      const std::vector<Eigen::Vector3f> before = NormalsAt(field, sites);
+      const auto albedo = [&](size_t p) { return rows.OwnColour(p); };
+      const std::vector<Estimate> before = EstimatesAt(field, sites, albedo);
       std::vector<uint8_t> agreeing(sites.size());
       job.feed.SolveConsensus(piece, sites, rows, agreeing);
-      JudgeConsensus(sites, before, agreeing, field, summary);
+      JudgeConsensus(sites, before, EstimatesAt(field, sites, albedo), agreeing, field, summary);
     });
   }
 }

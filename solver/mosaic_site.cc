@@ -179,8 +179,9 @@ void MosaicSite::Weigh(size_t site, SiteSolution& solution) const {
   }
   const Eigen::Matrix3d c = (weighted.transpose() * weighted).inverse();
   const double squared = solution.n.squaredNorm();
-  const double across = c.trace() - solution.n.dot(c * solution.n) / squared;
-  solution.uncertainty_deg = std::sqrt(std::max(0.0, across) / squared) * kDegPerRad;
+  const double along = solution.n.dot(c * solution.n) / squared;
+  solution.uncertainty_deg = std::sqrt(std::max(0.0, c.trace() - along) / squared) * kDegPerRad;
+  solution.albedo_uncertainty = std::sqrt(along / squared);
 }
 
 }  // namespace sateen

@@ -16,6 +16,7 @@ struct SiteSolution {
   Eigen::Vector3d n = Eigen::Vector3d::Zero();  // N
   double residual = 0.0;
   double uncertainty_deg = 0.0;
+  double albedo_uncertainty = 0.0;
   double misfit = 0.0;
   int samples = 0;
   Reason reason = Reason::kDark;

@@ -21,10 +21,22 @@ Eigen::Vector3d LuminanceWeights() {
           static_cast<double>(kLuminance[2])};
 }
 
-// (tr C - n C n) / |N|^2
-double AngularVarianceOf(const Eigen::Matrix3d& c, const Eigen::Vector3d& n) {
+// Variances of the angle, (tr C - n C n) / |N|^2, and of the albedo over its square, n C n / |N|^2.
+struct PlainVariances {
+  double angular;
+  double albedo;
+};
+
+PlainVariances VariancesOf(const Eigen::Matrix3d& c, const Eigen::Vector3d& n) {
   const double squared = n.squaredNorm();
-  return std::max(0.0, c.trace() - n.dot(c * n) / squared) / squared;
+  const double along = n.dot(c * n) / squared;
+  return {std::max(0.0, c.trace() - along) / squared, std::max(0.0, along) / squared};
+}
+
+// (11), of a variance of VariancesOf().
+double SpreadOf(double variance, double mean_square) {
+  return std::hypot(static_cast<double>(kUncertaintyFactor) * std::sqrt(variance * mean_square),
+                    static_cast<double>(kLeastModelUncertainty));
 }
 
 double ConditionSquared(const Eigen::Matrix3d& a) {
@@ -209,7 +221,9 @@ PlainAnswer PlainWeighted(const PixelSystem& system, const StackNoise& noise) {
   }
   answer.n = n + step;                                                                       // (4)
   answer.albedo = b * answer.n.norm();
-  answer.uncertainty_deg = std::sqrt(AngularVarianceOf(covariance, answer.n)) * kDegPerRad;  // (4)
+  const PlainVariances of_n = VariancesOf(covariance, answer.n);  // (4)
+  answer.uncertainty_deg = std::sqrt(of_n.angular) * kDegPerRad;
+  answer.albedo_uncertainty = std::sqrt(of_n.albedo);
   if (system.Count() > 3) {
     answer.misfit = std::max(0.0, chi_squared - gradient.dot(step)) / (system.Count() - 3);  // (5)
   }
@@ -245,9 +259,9 @@ PlainAnswer PlainConsensus(const PixelSystem& system, double max_condition) {
     return {};
   }
   const double spread = sums.squares / std::max(1.0, sums.weights - 3.0);
-  const double angle = static_cast<double>(kUncertaintyFactor) * kDegPerRad *
-                       std::sqrt(AngularVarianceOf(sums.a.inverse(), n) * spread);
-  answer.uncertainty_deg = std::hypot(angle, static_cast<double>(kLeastModelUncertaintyDeg));
+  const PlainVariances variances = VariancesOf(sums.a.inverse(), n);
+  answer.uncertainty_deg = SpreadOf(variances.angular, spread) * kDegPerRad;
+  answer.albedo_uncertainty = SpreadOf(variances.albedo, spread);
   for (const Eigen::Index k : ranked.order) {
     const double r = ranked.i(k, 3) - system.L().row(k).dot(n);
     answer.agreeing += std::abs(r) <= static_cast<double>(kAgreeing) ? 1 : 0;
@@ -281,6 +295,7 @@ void WeighRowsInDouble(const LightStack& stack, const Rig& rig, const Lambertian
     }
     misfit = 0.0F;
     field.uncertainty.pixels[pixel] = 0.0F;
+    field.albedo_uncertainty.pixels[pixel] = 0.0F;
     field.model.pixels[pixel] = static_cast<uint8_t>(Rung::kNone);
     if (field.reason.pixels[pixel] != static_cast<uint8_t>(Reason::kSolved)) {
       continue;
@@ -292,6 +307,7 @@ void WeighRowsInDouble(const LightStack& stack, const Rig& rig, const Lambertian
     const Eigen::Vector3d n = answer.n.stableNormalized();
     if (!n.allFinite() || n.isZero()) {
       field.uncertainty.pixels[pixel] = 180.0F;
+      field.albedo_uncertainty.pixels[pixel] = 1.0F;
       continue;
     }
     for (size_t c = 0; c < 3; ++c) {
@@ -299,9 +315,11 @@ void WeighRowsInDouble(const LightStack& stack, const Rig& rig, const Lambertian
       field.normal[c].pixels[pixel] = static_cast<float>(n[column]);
       field.albedo[c].pixels[pixel] = static_cast<float>(answer.albedo[column]);
     }
-    // In this order the minimum of 180 and not-a-number, of an infinite scale, is 180.
+    // In this order the minimum of a bound and not-a-number, of an infinite scale, is the bound.
     field.uncertainty.pixels[pixel] =
         static_cast<float>(std::min(180.0, answer.uncertainty_deg * noise_scale));
+    field.albedo_uncertainty.pixels[pixel] =
+        static_cast<float>(std::min(1.0, answer.albedo_uncertainty * noise_scale));
     misfit = static_cast<float>(answer.misfit);
   }
 }

@@ -16,6 +16,7 @@ struct PlainAnswer {
   Eigen::Array3d albedo = Eigen::Array3d::Zero();
   double residual = 0.0;
   double uncertainty_deg = 0.0;
+  double albedo_uncertainty = 0.0;
   double misfit = 0.0;  // rung 1 alone
   int agreeing = 0;     // rung 2 alone
 };

@@ -14,7 +14,7 @@
 namespace sateen {
 namespace {
 
-constexpr float kUnexplainedFactor = 3.0F;
+constexpr double kUnexplainedFactor = 3.0;
 // Where many pixels climb, the model is wrong in what noise hides in the others, too: fully from this
 // share on, and not at all where false alarms are as many.
 constexpr double kDoubtfulShare = 0.2;
@@ -33,6 +33,7 @@ void PieceSummary::Add(const PieceSummary& other) {
   robust_deg += other.robust_deg;
   sheen_deg += other.sheen_deg;
   turned_deg += other.turned_deg;
+  albedo_change += other.albedo_change;
   climbing_seconds += other.climbing_seconds;
   sheen_seconds += other.sheen_seconds;
 }
@@ -47,46 +48,58 @@ std::array<float, 256> MisfitLimits(double scale_squared, double false_alarms) {
   return limits;
 }
 
-std::vector<Eigen::Vector3f> NormalsAt(const NormalField& field, std::span<const size_t> pixels) {
-  std::vector<Eigen::Vector3f> normals;
-  normals.reserve(pixels.size());
+std::vector<Estimate> EstimatesAt(const NormalField& field, std::span<const size_t> pixels,
+                                  const std::function<float(size_t)>& albedo) {
+  std::vector<Estimate> estimates;
+  estimates.reserve(pixels.size());
   for (const size_t pixel : pixels) {
-    normals.emplace_back(field.normal[0].pixels[pixel], field.normal[1].pixels[pixel],
-                         field.normal[2].pixels[pixel]);
+    const Eigen::Vector3f n(field.normal[0].pixels[pixel], field.normal[1].pixels[pixel],
+                            field.normal[2].pixels[pixel]);
+    estimates.push_back({n, albedo(pixel)});
   }
-  return normals;
+  return estimates;
 }
 
-void JudgeConsensus(std::span<const size_t> pixels, std::span<const Eigen::Vector3f> before,
-                    std::span<const uint8_t> agreeing, NormalField& field, PieceSummary& summary) {
-  const std::vector<Eigen::Vector3f> after = NormalsAt(field, pixels);
+void JudgeConsensus(std::span<const size_t> pixels, std::span<const Estimate> before,
+                    std::span<const Estimate> after, std::span<const uint8_t> agreeing,
+                    NormalField& field, PieceSummary& summary) {
   for (size_t j = 0; j < pixels.size(); ++j) {
     const bool is_explained = agreeing[j] >= kFewestAgreeing;
-    const double turned_deg = std::atan2(static_cast<double>(before[j].cross(after[j]).norm()),
-                                         static_cast<double>(before[j].dot(after[j]))) *
+    const double turned_deg = std::atan2(static_cast<double>(before[j].n.cross(after[j].n).norm()),
+                                         static_cast<double>(before[j].n.dot(after[j].n))) *
                               kDegPerRad;
+    const auto albedo = static_cast<double>(after[j].albedo);
+    const double change =
+        albedo > 0.0 ? std::min(1.0, std::abs(static_cast<double>(before[j].albedo) / albedo - 1.0))
+                     : 1.0;
     const double rejected = 1.0 - static_cast<double>(agreeing[j]) /
                                       static_cast<double>(field.samples.pixels[pixels[j]]);
+    const double factor = (1.0 + std::max(0.0, rejected)) * (is_explained ? 1.0 : kUnexplainedFactor);
+    const auto doubt = [&](float of_spread, double difference) {
+      return static_cast<float>(
+          factor * std::hypot(static_cast<double>(of_spread),
+                              static_cast<double>(kUncertaintyOfTurn) * difference));
+    };
     float& uncertainty = field.uncertainty.pixels[pixels[j]];
-    uncertainty = static_cast<float>(
-        std::min(180.0, (1.0 + std::max(0.0, rejected)) *
-                            std::hypot(static_cast<double>(uncertainty),
-                                       static_cast<double>(kUncertaintyOfTurn) * turned_deg)));
-    if (!is_explained) {
-      uncertainty = std::min(180.0F, uncertainty * kUnexplainedFactor);
-      ++summary.unexplained;
-    }
+    uncertainty = std::min(180.0F, doubt(uncertainty, turned_deg));
+    float& of_albedo = field.albedo_uncertainty.pixels[pixels[j]];
+    of_albedo = std::min(1.0F, doubt(of_albedo, change));
+    summary.unexplained += is_explained ? 0 : 1;
     field.model.pixels[pixels[j]] =
         static_cast<uint8_t>(is_explained ? Rung::kConsensus : Rung::kUnexplained);
     summary.turned_deg += turned_deg;
+    summary.albedo_change += change;
     summary.robust_deg += static_cast<double>(uncertainty);
   }
   summary.robust += static_cast<int64_t>(pixels.size());
 }
 
-float Doubt::Of(float uncertainty_deg, Rung rung) const {
-  return std::min(
-      180.0F, std::hypot(uncertainty_deg, rung == Rung::kUnchecked ? unchecked_deg : checked_deg));
+void Doubt::AddTo(NormalField& field, size_t pixel) const {
+  const bool checked = field.model.pixels[pixel] != static_cast<uint8_t>(Rung::kUnchecked);
+  float& uncertainty = field.uncertainty.pixels[pixel];
+  uncertainty = std::min(180.0F, std::hypot(uncertainty, checked ? checked_deg : unchecked_deg));
+  float& of_albedo = field.albedo_uncertainty.pixels[pixel];
+  of_albedo = std::min(1.0F, std::hypot(of_albedo, checked ? checked_albedo : unchecked_albedo));
 }
 
 Doubt DoubtOf(const PieceSummary& total) {
@@ -95,10 +108,22 @@ Doubt DoubtOf(const PieceSummary& total) {
       static_cast<double>(total.robust) / static_cast<double>(std::max<int64_t>(solved, 1));
   const auto doubt = static_cast<float>(
       std::clamp((share - kUndoubtedShare) / (kDoubtfulShare - kUndoubtedShare), 0.0, 1.0));
-  const auto turned = static_cast<float>(total.turned_deg /
-                                         static_cast<double>(std::max<int64_t>(total.robust, 1)));
-  return {doubt * std::hypot(kLeastModelUncertaintyDeg, kUncertaintyOfTurn * turned),
-          doubt * std::hypot(kLeastModelUncertaintyDeg, turned)};
+  const auto climbed = static_cast<double>(std::max<int64_t>(total.robust, 1));
+  const auto turned = static_cast<float>(total.turned_deg / climbed);
+  const auto change = static_cast<float>(total.albedo_change / climbed);
+  constexpr auto kLeastDeg = kLeastModelUncertainty * static_cast<float>(kDegPerRad);
+  return {doubt * std::hypot(kLeastDeg, kUncertaintyOfTurn * turned),
+          doubt * std::hypot(kLeastModelUncertainty, kUncertaintyOfTurn * change),
+          doubt * std::hypot(kLeastDeg, turned),
+          doubt * std::hypot(kLeastModelUncertainty, change)};
+}
+
+void StoreSheenUncertainty(const SheenAnswer& answer, double noise_scale, NormalField& field,
+                           size_t pixel) {
+  field.uncertainty.pixels[pixel] = static_cast<float>(std::min(
+      180.0, std::hypot(answer.uncertainty_deg * noise_scale, kSheenUncertainty * kDegPerRad)));
+  field.albedo_uncertainty.pixels[pixel] = static_cast<float>(
+      std::min(1.0, std::hypot(answer.albedo_uncertainty * noise_scale, kSheenUncertainty)));
 }
 
 double SecondsOf(const std::function<void()>& work) {

@@ -7,7 +7,9 @@
 #include <span>
 #include <vector>
 
+#include "imaging/color.h"
 #include "solver/lambertian.h"
+#include "solver/sheen.h"
 
 // What the ladders of solver/ladder.h and solver/mosaic.h share: how a pixel's rungs are judged, and what
 // is said of them.
@@ -25,6 +27,7 @@ struct PieceSummary {
   double robust_deg = 0.0;
   double sheen_deg = 0.0;
   double turned_deg = 0.0;
+  double albedo_change = 0.0;
   double climbing_seconds = 0.0;
   double sheen_seconds = 0.0;
 
@@ -34,24 +37,46 @@ struct PieceSummary {
 // Largest misfit that noise explains, by usable samples: (5) of solver/ladder.h times s^2.
 [[nodiscard]] std::array<float, 256> MisfitLimits(double scale_squared, double false_alarms);
 
-[[nodiscard]] std::vector<Eigen::Vector3f> NormalsAt(const NormalField& field,
-                                                     std::span<const size_t> pixels);
+// Of luminance.
+[[nodiscard]] inline float AlbedoAt(const NormalField& field, size_t pixel) {
+  return kLuminance[0] * field.albedo[0].pixels[pixel] +
+         kLuminance[1] * field.albedo[1].pixels[pixel] +
+         kLuminance[2] * field.albedo[2].pixels[pixel];
+}
 
-// After the search for a consensus: (12) of solver/ladder.h and the rung of each pixel, from its normal
-// before and how many samples agree now; 0: the search has no answer.
-void JudgeConsensus(std::span<const size_t> pixels, std::span<const Eigen::Vector3f> before,
-                    std::span<const uint8_t> agreeing, NormalField& field, PieceSummary& summary);
+// What a rung says of a pixel.
+struct Estimate {
+  Eigen::Vector3f n;
+  float albedo;  // of luminance, or of a site's own colour
+};
+[[nodiscard]] std::vector<Estimate> EstimatesAt(const NormalField& field,
+                                                std::span<const size_t> pixels,
+                                                const std::function<float(size_t)>& albedo);
 
-// What the uncertainty of rung 1 owes to a model that is wrong for many pixels, in degrees: where from 2
-// to 20 of 100 climb, 0 to all of the error of those that do.
+// After the search for a consensus: (12) of solver/ladder.h and the rung of each pixel, from what was said
+// of it before and is now, and how many samples agree now; 0: the search has no answer.
+void JudgeConsensus(std::span<const size_t> pixels, std::span<const Estimate> before,
+                    std::span<const Estimate> after, std::span<const uint8_t> agreeing,
+                    NormalField& field, PieceSummary& summary);
+
+// What the uncertainties of rung 1 owe to a model that is wrong for many pixels: where from 2 to 20 of 100
+// climb, 0 to all of the error of those that do.
 struct Doubt {
   float checked_deg = 0.0F;
+  float checked_albedo = 0.0F;
   float unchecked_deg = 0.0F;  // what nothing could check is as wrong as those that climbed were
+  float unchecked_albedo = 0.0F;
 
   [[nodiscard]] bool IsNone() const { return checked_deg == 0.0F; }
-  [[nodiscard]] float Of(float uncertainty_deg, Rung rung) const;
+  // For a pixel of rung 1.
+  void AddTo(NormalField& field, size_t pixel) const;
 };
 [[nodiscard]] Doubt DoubtOf(const PieceSummary& total);
+
+// Of a pixel under a sheen: what noise does, `noise_scale` times what the answer says, and what a cloth
+// differs by from the sheen it is given.
+void StoreSheenUncertainty(const SheenAnswer& answer, double noise_scale, NormalField& field,
+                           size_t pixel);
 
 [[nodiscard]] double SecondsOf(const std::function<void()>& work);
 

@@ -136,8 +136,10 @@ SheenAnswer SolveSheen(const SheenSamples& samples, const Sheen& sheen) {
   }
   answer.residual = r.norm() / std::sqrt(static_cast<double>(l.rows()));
   answer.misfit = r.dot(w.cwiseProduct(r)) / static_cast<double>(l.rows() - 3);
-  const double across = covariance.trace() - unit.dot(covariance * unit);
-  answer.uncertainty_deg = std::sqrt(std::max(0.0, across)) / n.norm() * kDegPerRad;
+  const double along = unit.dot(covariance * unit);
+  answer.uncertainty_deg =
+      std::sqrt(std::max(0.0, covariance.trace() - along)) / n.norm() * kDegPerRad;
+  answer.albedo_uncertainty = std::sqrt(along) / n.norm();
   return answer;
 }
 

@@ -23,6 +23,7 @@ struct SheenAnswer {
   Eigen::Vector3d albedo = Eigen::Vector3d::Zero();  // of the body
   double residual = 0.0;                             // RMS of the luminance
   double uncertainty_deg = 0.0;                      // with s = 1
+  double albedo_uncertainty = 0.0;
   double misfit = 0.0;                               // chi^2 over its degrees of freedom
 };
 

@@ -127,6 +127,8 @@ void Resample(const NormalField& field, const Place& place, int column, int row,
   result.residual.At(column, row) = static_cast<float>(Linear(field.residual, place));
   if (!field.model.pixels.empty()) {
     result.uncertainty.At(column, row) = static_cast<float>(Linear(field.uncertainty, place));
+    result.albedo_uncertainty.At(column, row) =
+        static_cast<float>(Linear(field.albedo_uncertainty, place));
     result.model.At(column, row) =
         field.model.At(std::min(place.NearestX(), field.model.width - 1),
                        std::min(place.NearestY(), field.model.height - 1));
@@ -169,6 +171,7 @@ Result<NormalField> Undistorted(const NormalField& field, const Camera& camera, 
   result.reason = Image<uint8_t>(size, static_cast<uint8_t>(Reason::kOutsideMask));
   if (!field.model.pixels.empty()) {
     result.uncertainty = Image<float>(size);
+    result.albedo_uncertainty = Image<float>(size);
     result.model = Image<uint8_t>(size);
   }
   const Status done = CheckSize(field.reason.Size(), camera).and_then([&] {
