@@ -40,7 +40,7 @@ HWY_INLINE Incoming IncomingAt(const KernelLight& light, V x_mm, V y_mm) {
   const Vector3 to_light{hn::Sub(hn::Set(d, light.place[0]), x_mm),
                          hn::Sub(hn::Set(d, light.place[1]), y_mm), hn::Set(d, light.place[2])};
   const V squared = Dot(to_light, to_light);
-  const V inverse = hn::Div(hn::Set(d, 1.0F), hn::Sqrt(squared));
+  const V inverse = ReciprocalRootOf(squared);
   Incoming in{
       {hn::Mul(to_light.x, inverse), hn::Mul(to_light.y, inverse), hn::Mul(to_light.z, inverse)},
       squared};
