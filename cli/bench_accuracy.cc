@@ -112,7 +112,8 @@ class AccuracyBench {
       return tl::unexpected(rendered.error());
     }
     capture.stack = std::move(rendered->stack);
-    capture.truth = Truth{.normal = std::move(rendered->normal)};
+    capture.truth =
+        Truth{.normal = std::move(rendered->normal), .albedo = std::move(rendered->albedo)};
     return MeasureColours("Lambertian relief", capture);
   }
 
@@ -234,29 +235,52 @@ class AccuracyBench {
     }
     row.angular_error_deg = *error;
     if (!field_.uncertainty.pixels.empty()) {
-      CompareUncertainty(capture, error_deg, row);
+      Compare(error_deg, field_.uncertainty, capture, row.standardised_error, row.coverage);
+    }
+    if (Status status = MeasureAlbedo(capture, row); !status) {
+      return status;
     }
     report_.rows.push_back(std::move(row));
     return task_.CheckCancelled();
   }
 
-  void CompareUncertainty(const Capture& capture, const Image<float>& error_deg,
-                          AccuracyRow& row) const {
+  Status MeasureAlbedo(const Capture& capture, AccuracyRow& row) const {
+    if (!capture.truth->albedo) {
+      return {};
+    }
+    const Result<ErrorStatistics> mean = RelativeAlbedoError(field_, *capture.truth->albedo);
+    const Result<Image<float>> error =
+        AlbedoErrorMap(field_, *capture.truth->albedo,
+                       capture.mosaics ? &capture.mosaics->stack.cfa : nullptr);
+    if (!mean || !error) {
+      return tl::unexpected(!mean ? mean.error() : error.error());
+    }
+    row.albedo_error = mean->mean;
+    if (!field_.albedo_uncertainty.pixels.empty()) {
+      Compare(*error, field_.albedo_uncertainty, capture, row.albedo_standardised_error,
+              row.albedo_coverage);
+    }
+    return {};
+  }
+
+  // Root mean square of error over uncertainty, and the share of errors inside the interval.
+  void Compare(const Image<float>& errors, const Image<float>& uncertainties,
+               const Capture& capture, double& standardised, double& coverage) const {
     double squares = 0.0;
     int64_t inside = 0;
     int64_t count = 0;
-    for (size_t p = 0; p < error_deg.pixels.size(); ++p) {
+    for (size_t p = 0; p < errors.pixels.size(); ++p) {
       if (!IsSolved(field_, p) || !IsInside(capture.mask, p) ||
           capture.truth->normal[2].pixels[p] == 0.0F) {
         continue;
       }
-      const float ratio = error_deg.pixels[p] / std::max(field_.uncertainty.pixels[p], 1e-9F);
+      const float ratio = errors.pixels[p] / std::max(uncertainties.pixels[p], 1e-9F);
       squares += static_cast<double>(ratio) * static_cast<double>(ratio);
       inside += ratio <= kInterval95 ? 1 : 0;
       ++count;
     }
-    row.standardised_error = std::sqrt(squares / static_cast<double>(std::max<int64_t>(count, 1)));
-    row.coverage = static_cast<double>(inside) / static_cast<double>(std::max<int64_t>(count, 1));
+    standardised = std::sqrt(squares / static_cast<double>(std::max<int64_t>(count, 1)));
+    coverage = static_cast<double>(inside) / static_cast<double>(std::max<int64_t>(count, 1));
   }
 
   const BenchAccuracyArgs& args_;

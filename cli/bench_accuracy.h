@@ -33,6 +33,11 @@ struct AccuracyRow {
   // that should hold 95 of 100; 0 without one.
   double standardised_error = 0.0;
   double coverage = 0.0;
+  // Mean relative error of the colours of albedo, and of a ladder the same two of its uncertainty; 0 where
+  // no truth is known.
+  double albedo_error = 0.0;
+  double albedo_standardised_error = 0.0;
+  double albedo_coverage = 0.0;
 };
 
 struct AccuracyReport {

@@ -92,10 +92,8 @@ std::string Panel(const AccuracyReport& report, const std::string& data, double 
   return svg;
 }
 
-std::string Ratio(const AccuracyRow& row) {
-  return row.coverage > 0.0
-             ? fmt::format("{:.2f} | {:.1f}", row.standardised_error, 100.0 * row.coverage)
-             : " | ";
+std::string Ratio(double standardised, double coverage) {
+  return coverage > 0.0 ? fmt::format("{:.2f} | {:.1f}", standardised, 100.0 * coverage) : " | ";
 }
 
 }  // namespace
@@ -118,6 +116,13 @@ std::string JsonReport(const AccuracyReport& report) {
       json["standardised_error"] = row.standardised_error;
       json["coverage"] = row.coverage;
     }
+    if (row.albedo_error > 0.0) {
+      json["albedo_error"] = row.albedo_error;
+    }
+    if (row.albedo_coverage > 0.0) {
+      json["albedo_standardised_error"] = row.albedo_standardised_error;
+      json["albedo_coverage"] = row.albedo_coverage;
+    }
     rows.push_back(std::move(json));
   }
   const nlohmann::json json = {{"schema", "sateen.bench.accuracy/1"},
@@ -130,9 +135,10 @@ std::string JsonReport(const AccuracyReport& report) {
 }
 
 std::string TextReport(const AccuracyReport& report) {
-  std::string text = fmt::format("{:<32} {:<22} {:>8} {:>8} {:>8} {:>8} {:>12} {:>6} {:>6} {:>7}\n",
-                                 "data", "method", "mean deg", "median", "p99", "solved %",
-                                 "ns/px, 1 th.", "Mpx/s", "stand.", "in 95 %");
+  std::string text = fmt::format(
+      "{:<32} {:<22} {:>8} {:>8} {:>8} {:>8} {:>12} {:>6} {:>6} {:>7} {:>8} {:>6} {:>7}\n", "data",
+      "method", "mean deg", "median", "p99", "solved %", "ns/px, 1 th.", "Mpx/s", "stand.",
+      "in 95 %", "albedo %", "stand.", "in 95 %");
   for (const AccuracyRow& row : report.rows) {
     text += fmt::format("{:<32} {:<22} {:>8.3f} {:>8.3f} {:>8.2f} {:>8.2f} {:>12.0f}", row.data,
                         row.method, row.angular_error_deg.mean, row.angular_error_deg.median,
@@ -140,15 +146,22 @@ std::string TextReport(const AccuracyReport& report) {
     text += row.megapixels_per_s > 0.0 ? fmt::format(" {:>6.1f}", row.megapixels_per_s)
                                        : fmt::format(" {:>6}", "");
     text += row.coverage > 0.0
-                ? fmt::format(" {:>6.2f} {:>7.1f}\n", row.standardised_error, 100.0 * row.coverage)
-                : "\n";
+                ? fmt::format(" {:>6.2f} {:>7.1f}", row.standardised_error, 100.0 * row.coverage)
+                : fmt::format(" {:>6} {:>7}", "", "");
+    text += row.albedo_error > 0.0 ? fmt::format(" {:>8.3f}", 100.0 * row.albedo_error) : "";
+    text += row.albedo_coverage > 0.0
+                ? fmt::format(" {:>6.2f} {:>7.1f}", row.albedo_standardised_error,
+                              100.0 * row.albedo_coverage)
+                : "";
+    text += "\n";
   }
   for (const std::string& skipped : report.skipped) {
     text += fmt::format("skipped: {}\n", skipped);
   }
   text += fmt::format(
-      "Mpx/s on {} threads ({}); stand.: root mean square of error over predicted uncertainty; in "
-      "95 %: errors inside the interval that should hold 95 of 100\n",
+      "Mpx/s on {} threads ({}); stand.: root mean square of error over predicted uncertainty, of normals and "
+      "of albedo; in 95 %: errors inside the interval that should hold 95 of 100; albedo %: mean relative "
+      "error of its colours\n",
       report.threads, report.instruction_set);
   return text;
 }
@@ -165,7 +178,9 @@ std::string MarkdownReport(const AccuracyReport& report, const std::string& plot
       "error over predicted\n"
       "uncertainty, 1 where the model holds; \"in 95 %\" the share of errors inside the interval "
       "that should hold 95 of\n"
-      "100. *LDLT a pixel*, *Huber*, *L1*, *sparse Bayesian* (Ikehata et al. 2012) and *bdcSvd* "
+      "100; \"albedo %\" the mean relative error of its colours, and after it the same two of the "
+      "albedo's uncertainty, which\n"
+      "is that of its luminance, from mosaics of a site's own colour. *LDLT a pixel*, *Huber*, *L1*, *sparse Bayesian* (Ikehata et al. 2012) and *bdcSvd* "
       "are plain\n"
       "re-implementations from the papers, in double and on one thread; the first four see the "
       "same usable samples as\n"
@@ -183,17 +198,19 @@ std::string MarkdownReport(const AccuracyReport& report, const std::string& plot
   for (const std::string& data : DataSetsOf(report)) {
     text += fmt::format(
         "\n## {}\n\n| method | mean | median | p99 | solved % | ns/px | Mpx/s | standardised | in "
-        "95 % |\n"
-        "| --- | --- | --- | --- | --- | --- | --- | --- | --- |\n",
+        "95 % | albedo % | standardised | in 95 % |\n"
+        "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n",
         data);
     for (const AccuracyRow& row : report.rows) {
       if (row.data == data) {
         text += fmt::format(
-            "| {} | {:.3f} | {:.3f} | {:.2f} | {:.2f} | {:.0f} | {} | {} |\n", row.method,
+            "| {} | {:.3f} | {:.3f} | {:.2f} | {:.2f} | {:.0f} | {} | {} | {} | {} |\n", row.method,
             row.angular_error_deg.mean, row.angular_error_deg.median, row.angular_error_deg.p99,
             SolvedPercent(row), row.ns_per_pixel,
             row.megapixels_per_s > 0.0 ? fmt::format("{:.1f}", row.megapixels_per_s) : "",
-            Ratio(row));
+            Ratio(row.standardised_error, row.coverage),
+            row.albedo_error > 0.0 ? fmt::format("{:.3f}", 100.0 * row.albedo_error) : "",
+            Ratio(row.albedo_standardised_error, row.albedo_coverage));
       }
     }
   }

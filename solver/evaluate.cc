@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/angle.h"
+#include "imaging/color.h"
 #include "core/check.h"
 
 namespace sateen {
@@ -152,6 +153,29 @@ Result<ErrorStatistics> AngularErrorDeg(const NormalField& field, const Image3& 
     }
   }
   return StatisticsOf(std::move(errors_deg));
+}
+
+Result<Image<float>> AlbedoErrorMap(const NormalField& field, const Image3& true_albedo,
+                                    const std::array<uint8_t, 4>* cfa) {
+  if (Status status = CheckSize(field, true_albedo, "albedos"); !status) {
+    return tl::unexpected(status.error());
+  }
+  const auto width = static_cast<size_t>(field.reason.width);
+  const Eigen::Vector3d luminance(static_cast<double>(kLuminance[0]),
+                                  static_cast<double>(kLuminance[1]),
+                                  static_cast<double>(kLuminance[2]));
+  Image<float> map(field.reason.Size());
+  for (size_t p = 0; p < map.pixels.size(); ++p) {
+    const Eigen::Vector3d weights =
+        cfa == nullptr ? luminance
+                       : Eigen::Vector3d::Unit((*cfa)[p / width % 2 * 2 + p % width % 2]);
+    const double truth = weights.dot(VectorAt(true_albedo, p));
+    if (IsSolved(field, p) && truth > 0.0) {
+      map.pixels[p] = static_cast<float>(
+          std::abs(weights.dot(VectorAt(field.albedo, p)) - truth) / truth);
+    }
+  }
+  return map;
 }
 
 Result<ErrorStatistics> RelativeAlbedoError(const NormalField& field, const Image3& true_albedo) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 
 #include "core/error.h"
@@ -45,6 +46,16 @@ struct ErrorStatistics {
 [[nodiscard]] Result<ErrorStatistics> LowFrequencyErrorDeg(const NormalField& field,
                                                            const Image3& true_normal,
                                                            double pitch_mm);
+
+/// By what share the albedo of each pixel is off, the error that NormalField::albedo_uncertainty predicts:
+///
+///     |y - t| / t,   y, t: luminances of solved and true albedo
+///
+/// of a mosaic, whose colours of rows 0 and 1, columns 0 and 1, `cfa` names, of the site's own colour alone,
+/// because the others are its neighbours'. 0 where unsolved or t is not above 0. kBadData when the sizes differ.
+[[nodiscard]] Result<Image<float>> AlbedoErrorMap(const NormalField& field,
+                                                  const Image3& true_albedo,
+                                                  const std::array<uint8_t, 4>* cfa = nullptr);
 
 // |rho - t| / t over the channels of those pixels whose true albedo t is above 0.
 [[nodiscard]] Result<ErrorStatistics> RelativeAlbedoError(const NormalField& field,

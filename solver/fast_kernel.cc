@@ -89,7 +89,9 @@ HWY_INLINE void SolveVector(const KernelParams& params, const KernelInput& input
   Answer answer;
   Weighted weighted;
   if constexpr (kWeighted) {
-    weighted = SolveWeighted<kDistant>(params, scratch, threshold, scale);
+    weighted = hn::AllTrue(d, hn::Gt(gathered.dimmest, threshold))
+                   ? SolveWeighted<kDistant, true>(params, scratch, threshold, scale)
+                   : SolveWeighted<kDistant, false>(params, scratch, threshold, scale);
     answer = {weighted.n, {}, weighted.sum_of_squares, weighted.count, weighted.accepted};
   } else {
     answer = SolvePlain<kDistant>(params, scratch, threshold);

@@ -81,7 +81,7 @@ inline constexpr float kFloatConditionSquared = 400.0F;
 void SolveSpan(const KernelParams& params, const KernelInput& input, const KernelOutput& output);
 
 /// The same, then one step to the normal that has the samples' noise for weights (equations (1) to
-/// (5) of solver/ladder.h); `misfit`, `model` and both uncertainties must be there. Costs 1.5 times SolveSpan.
+/// (5) of solver/ladder.h); `misfit`, `model` and both uncertainties must be there. Costs 1.4 times SolveSpan.
 void SolveWeightedSpan(const KernelParams& params, const KernelInput& input,
                        const KernelOutput& output);
 

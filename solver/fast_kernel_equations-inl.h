@@ -34,18 +34,28 @@ HWY_INLINE void AddScaled(const Vector3& l, V factor, Vector3& sum) {
   sum.z = hn::MulAdd(l.z, factor, sum.z);
 }
 
-template <bool kDistant>
+// v, zero where the sample is not usable. kAllUsable: all are, which is not asked again.
+template <bool kAllUsable = false>
+HWY_INLINE V KeptOf(M usable, V v) {
+  if constexpr (kAllUsable) {
+    return v;
+  } else {
+    return hn::IfThenElseZero(usable, v);
+  }
+}
+
+template <bool kDistant, bool kAllUsable = false>
 HWY_INLINE Vector3 DirectionOf(const KernelLight& light, const float* slot, M usable) {
   const D d;
   const size_t lanes = hn::Lanes(d);
   if constexpr (kDistant) {
-    return {hn::IfThenElseZero(usable, hn::Set(d, light.place[0])),
-            hn::IfThenElseZero(usable, hn::Set(d, light.place[1])),
-            hn::IfThenElseZero(usable, hn::Set(d, light.place[2]))};
+    return {KeptOf<kAllUsable>(usable, hn::Set(d, light.place[0])),
+            KeptOf<kAllUsable>(usable, hn::Set(d, light.place[1])),
+            KeptOf<kAllUsable>(usable, hn::Set(d, light.place[2]))};
   } else {
-    return {hn::IfThenElseZero(usable, hn::Load(d, slot)),
-            hn::IfThenElseZero(usable, hn::Load(d, slot + lanes)),
-            hn::IfThenElseZero(usable, hn::Load(d, slot + 2 * lanes))};
+    return {KeptOf<kAllUsable>(usable, hn::Load(d, slot)),
+            KeptOf<kAllUsable>(usable, hn::Load(d, slot + lanes)),
+            KeptOf<kAllUsable>(usable, hn::Load(d, slot + 2 * lanes))};
   }
 }
 

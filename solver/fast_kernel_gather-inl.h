@@ -65,6 +65,7 @@ HWY_INLINE M AllFinite(V r, V g, V b) {
 
 struct Gathered {
   V brightest;      // largest i'_k of the unsaturated samples
+  V dimmest;        // smallest i'_k; -1 where a sample is saturated or not a number
   V brightest_raw;  // largest radiance of any finite sample
   V saturated;      // how many samples are saturated
   M bright;         // some sample is above its dark level
@@ -78,7 +79,7 @@ HWY_INLINE Gathered Gather(const KernelParams& params, const KernelInput& input,
   const size_t lanes = hn::Lanes(d);
   const V zero = hn::Zero(d);
   const float* const* const planes = input.planes;
-  Gathered gathered{zero, zero, zero, NoLanes()};
+  Gathered gathered{zero, hn::Inf(d), zero, zero, NoLanes()};
   for (size_t k = 0; k < params.lights.size(); ++k) {
     const KernelLight& light = params.lights[k];
     for (size_t c = 0; c < 3; ++c) {
@@ -129,6 +130,7 @@ HWY_INLINE Gathered Gather(const KernelParams& params, const KernelInput& input,
     const V kept = hn::IfThenElse(usable, luminance, hn::Set(d, -1.0F));
     const V known_peak = hn::IfThenElseZero(number, peak);
     gathered.brightest = hn::Max(gathered.brightest, kept);
+    gathered.dimmest = hn::Min(gathered.dimmest, kept);
     gathered.brightest_raw = hn::Max(gathered.brightest_raw, known_peak);
     gathered.saturated =
         hn::Add(gathered.saturated, hn::IfThenElseZero(saturated, hn::Set(d, 1.0F)));

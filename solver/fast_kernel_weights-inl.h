@@ -48,7 +48,7 @@ struct StartEquations {
   V count;
 };
 
-template <bool kDistant>
+template <bool kDistant, bool kAllUsable>
 HWY_INLINE StartEquations AccumulateStart(const KernelParams& params, const float* scratch,
                                           V threshold) {
   const D d;
@@ -56,17 +56,22 @@ HWY_INLINE StartEquations AccumulateStart(const KernelParams& params, const floa
   const V zero = hn::Zero(d);
   StartEquations eq{
       {zero, zero, zero, zero, zero, zero}, {zero, zero, zero}, {zero, zero, zero}, zero};
+  if constexpr (kAllUsable) {
+    eq.count = hn::Set(d, static_cast<float>(params.lights.size()));
+  }
   for (size_t k = 0; k < params.lights.size(); ++k) {
     const float* slot = scratch + k * kScratchPerLight * lanes;
     const V luminance = hn::Load(d, slot + 6 * lanes);
     const M usable = hn::Gt(luminance, threshold);
-    const Vector3 l = DirectionOf<kDistant>(params.lights[k], slot, usable);
+    const Vector3 l = DirectionOf<kDistant, kAllUsable>(params.lights[k], slot, usable);
     AddSquare(l, eq.a);
-    AddScaled(l, hn::IfThenElseZero(usable, luminance), eq.b);
+    AddScaled(l, KeptOf<kAllUsable>(usable, luminance), eq.b);
     for (size_t c = 0; c < 3; ++c) {
-      eq.sum[c] = hn::Add(eq.sum[c], hn::IfThenElseZero(usable, hn::Load(d, slot + (3 + c) * lanes)));
+      eq.sum[c] = hn::Add(eq.sum[c], KeptOf<kAllUsable>(usable, hn::Load(d, slot + (3 + c) * lanes)));
     }
-    eq.count = hn::Add(eq.count, hn::IfThenElseZero(usable, hn::Set(d, 1.0F)));
+    if constexpr (!kAllUsable) {
+      eq.count = hn::Add(eq.count, hn::IfThenElseZero(usable, hn::Set(d, 1.0F)));
+    }
   }
   return eq;
 }
@@ -111,6 +116,7 @@ struct NoiseUnits {
   V e[3];
   V least;  // 0.02 |N|
   V reference;
+  V of_luminance;  // R of (4)
 };
 
 // Variances of (1) on a pixel that faces light 0.
@@ -153,6 +159,14 @@ HWY_INLINE NoiseUnits NoiseUnitsOf(const KernelLight& light, const float* slot, 
     units.e[c] = hn::Mul(squared_u, hn::Mul(inverse, read));
   }
   units.least = hn::Mul(length, hn::Set(d, kLeastCosine));
+  V of_luminance = zero;
+  V of_m = tiny;
+  for (size_t c = 0; c < 3; ++c) {
+    const V bounded = hn::Max(variance[c], least);
+    of_luminance = hn::MulAdd(hn::Set(d, kLuminance[c] * kLuminance[c]), bounded, of_luminance);
+    of_m = hn::MulAdd(hn::Mul(units.u[c], units.u[c]), bounded, of_m);
+  }
+  units.of_luminance = hn::Mul(of_luminance, RoughReciprocalOf(of_m));
   return units;
 }
 
@@ -168,7 +182,7 @@ HWY_INLINE V DotOf(const std::array<float, 3>& of_light, const V* of_pixel) {
 // residuals. It needs no NoiseUnits and runs while they are on their way; in one loop with what follows,
 // few lights fit into the processor's window at a time: the kernel took 22.4 ns a pixel in the cache, and
 // takes 20.7.
-template <bool kDistant>
+template <bool kDistant, bool kAllUsable>
 HWY_INLINE V PredictSamples(const KernelParams& params, float* scratch, V threshold,
                             const Vector3& n) {
   const D d;
@@ -178,8 +192,8 @@ HWY_INLINE V PredictSamples(const KernelParams& params, float* scratch, V thresh
     float* slot = scratch + k * kScratchPerLight * lanes;
     const V luminance = hn::Load(d, slot + 6 * lanes);
     const M usable = hn::Gt(luminance, threshold);
-    const V predicted = Dot(DirectionOf<kDistant>(params.lights[k], slot, usable), n);
-    const V left = hn::Sub(hn::IfThenElseZero(usable, luminance), predicted);
+    const V predicted = Dot(DirectionOf<kDistant, kAllUsable>(params.lights[k], slot, usable), n);
+    const V left = hn::Sub(KeptOf<kAllUsable>(usable, luminance), predicted);
     sum_of_squares = hn::MulAdd(left, left, sum_of_squares);
     hn::Store(predicted, d, slot + 8 * lanes);
   }
@@ -187,7 +201,7 @@ HWY_INLINE V PredictSamples(const KernelParams& params, float* scratch, V thresh
 }
 
 // Fills in W_k, in units of 1 / `reference` and zero where the sample is not usable, and m_k - N . l_k.
-template <bool kDistant>
+template <bool kDistant, bool kAllUsable>
 HWY_INLINE void WeighSamples(const KernelParams& params, float* scratch, V threshold,
                              const NoiseUnits& units) {
   const D d;
@@ -211,8 +225,8 @@ HWY_INLINE void WeighSamples(const KernelParams& params, float* scratch, V thres
       variance = hn::Mul(gain, hn::MulAdd(gain, read, shot));
     }
     const V weight = RoughReciprocalOf(hn::Max(variance, hn::Set(d, kLeastVariance)));
-    hn::Store(hn::IfThenElseZero(usable, weight), d, slot + 3 * lanes);
-    hn::Store(hn::IfThenElseZero(usable, hn::Sub(mean, predicted)), d, slot + 4 * lanes);
+    hn::Store(KeptOf<kAllUsable>(usable, weight), d, slot + 3 * lanes);
+    hn::Store(KeptOf<kAllUsable>(usable, hn::Sub(mean, predicted)), d, slot + 4 * lanes);
   }
 }
 
@@ -231,7 +245,7 @@ HWY_INLINE WeightedSums AccumulateWeighted(const KernelParams& params, const flo
   WeightedSums sums{{zero, zero, zero, zero, zero, zero}, {zero, zero, zero}, zero};
   for (size_t k = 0; k < params.lights.size(); ++k) {
     const float* slot = scratch + k * kScratchPerLight * lanes;
-    const Vector3 l = DirectionOf<kDistant>(params.lights[k], slot, hn::Not(NoLanes()));
+    const Vector3 l = DirectionOf<kDistant, true>(params.lights[k], slot, NoLanes());
     const V weight = hn::Load(d, slot + 3 * lanes);
     const V misfit = hn::Load(d, slot + 4 * lanes);
     const V r = hn::Mul(weight, misfit);
@@ -242,12 +256,14 @@ HWY_INLINE WeightedSums AccumulateWeighted(const KernelParams& params, const flo
   return sums;
 }
 
-template <bool kDistant>
+// kAllUsable, of every sample of every lane, as most vectors of a cloth are: the same bits without the
+// masks, which are a tenth of the work.
+template <bool kDistant, bool kAllUsable>
 HWY_INLINE Weighted SolveWeighted(const KernelParams& params, float* scratch, V threshold,
                                   const Scale& scale) {
   const D d;
   const V zero = hn::Zero(d);
-  const StartEquations start = AccumulateStart<kDistant>(params, scratch, threshold);
+  const StartEquations start = AccumulateStart<kDistant, kAllUsable>(params, scratch, threshold);
   Weighted weighted;
   const V luminance = hn::MulAdd(
       hn::Set(d, kLuminance[0]), start.sum[0],
@@ -261,8 +277,8 @@ HWY_INLINE Weighted SolveWeighted(const KernelParams& params, float* scratch, V 
   const Vector3 n = Scaled(Times(first.cofactor, start.b), first.inverse_det);
   const NoiseUnits units =
       NoiseUnitsOf<kDistant>(params.lights[0], scratch, weighted.colour, n, scale);
-  weighted.sum_of_squares = PredictSamples<kDistant>(params, scratch, threshold, n);
-  WeighSamples<kDistant>(params, scratch, threshold, units);
+  weighted.sum_of_squares = PredictSamples<kDistant, kAllUsable>(params, scratch, threshold, n);
+  WeighSamples<kDistant, kAllUsable>(params, scratch, threshold, units);
   const WeightedSums sums = AccumulateWeighted<kDistant>(params, scratch);
   const Inverse inverse = Invert(sums.a, params.max_condition_squared * kWeightedConditionFactor);
   const Vector3 step = Times(inverse.a, sums.gradient);
@@ -276,7 +292,10 @@ HWY_INLINE Weighted SolveWeighted(const KernelParams& params, float* scratch, V 
   const Variances variances = VariancesOf(inverse.a, weighted.n);  // (4)
   weighted.uncertainty_deg = hn::Mul(RoughRootOf(hn::Mul(variances.angular, units.reference)),
                                      hn::Set(d, kDegreesPerRadian));
-  weighted.albedo_uncertainty = RoughRootOf(hn::Mul(variances.albedo, units.reference));
+  const V known = hn::Max(Dot(weighted.n, Times(sums.a, weighted.n)), hn::Set(d, 1e-37F));
+  const V of_albedo = hn::MulAdd(hn::Sub(units.of_luminance, hn::Set(d, 1.0F)),
+                                 RoughReciprocalOf(known), variances.albedo);
+  weighted.albedo_uncertainty = RoughRootOf(hn::Mul(of_albedo, units.reference));
   weighted.count = start.count;
   weighted.accepted = hn::And(first.accepted, inverse.accepted);
   return weighted;

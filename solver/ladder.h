@@ -43,18 +43,21 @@ struct LadderOptions {
 ///     m_k = sum_c u_c i'_kc,  u_c = (b_c / v_c) / sum_c (b_c^2 / v_c), v_c = (1) of the first
 ///     light on a pixel that faces it, at least a millionth of the three                      (3)
 ///     N = argmin sum_k W_k (m_k - N . l_k)^2,  W_k = 1 / sum_c u_c^2 var_kc,  rho_c = b_c |N|,
-///     uncertainty = s sqrt(tr C - n.C n) / |N|,  C = (sum_k W_k l_k l_k^T)^-1                (4)
+///     uncertainty = s sqrt(tr C - n.C n) / |N|,  C = (sum_k W_k l_k l_k^T)^-1,
+///     that of the albedo's luminance = s sqrt(n.C n + (R - 1) / (n.C^-1 n)) / |N|,
+///     R = sum_c y_c^2 v_c / sum_c u_c^2 v_c, y_c: 0.2126, 0.7152, 0.0722                      (4)
 ///     misfit = sum_k W_k (m_k - N . l_k)^2 / (usable - 3)                                    (5)
 ///
 /// Variances come from what least squares predict, not from the samples: weights taken from noisy
 /// samples would draw N towards the dark. `uncertainty` is the root mean square angle, in degrees,
 /// between n and the truth; 95 of 100 angles are below 1.96 times that (1.73 where it is the same in
-/// all directions). s^2 is the 25th percentile (5th where the noise is unknown) of the misfits of some
+/// all directions). That of the albedo is a share of it; R, because each rho_c is known from its own
+/// channel alone. s^2 is the 25th percentile (5th where the noise is unknown) of the misfits of some
 /// 4,000 pixels over that of chi^2: at most 1 where the noise is known, because demosaicing only takes
 /// noise away; at most what neighbouring pixels differ by where it is not, because a shiny scene
 /// misfits everywhere. Never below what rounding of the samples leaves, which in smooth frames may be
 /// all there is. Where the noise is unknown and no pixel has more than three samples, s^2 is what
-/// neighbours differ by; where they tell nothing either, uncertainty = 180: unknown.
+/// neighbours differ by; where they tell nothing either, uncertainty = 180 and that of the albedo 1: unknown.
 ///
 /// Rung 2, consensus, where misfit / s^2 is above the (1 - false_alarms) quantile of chi^2 and the
 /// residual above explained_residual |N|. With the sum a_c of i'_kc over the usable samples and its
@@ -70,6 +73,9 @@ struct LadderOptions {
 ///     spread = hypot(3 degrees, 4 sqrt((tr C - n.C n) S) / |N|),
 ///     C = (sum_k w_k l_k l_k^T)^-1, S = sum_k w_k r_k^2 / max(1, sum_k w_k - 3)               (11)
 ///     uncertainty = (2 - agreeing / usable) hypot(spread, 0.4 t), t = angle to rung 1's n      (12)
+///
+/// and of the albedo the same with n.C n in (11), 0.05 instead of 3 degrees, and for t the share by which
+/// the albedo's luminance differs from rung 1's.
 ///
 /// (6): the highlights of white lights on what is not metal are white, and a coloured cloth's
 /// departure from grey has no part in them.
@@ -94,8 +100,10 @@ struct LadderOptions {
 ///
 ///     uncertainty <- hypot(uncertainty, b / 2),  b^2 = |n(x-1) - 2 n + n(x+1)|^2 + the same in y  (16)
 ///
+/// and of the albedo the same with its luminance over that of the pixel for n.
+///
 /// stack, rig, mask, errors   as SolveLambertian
-/// Cost     rung 1 about 1.5 times SolveLambertian; rung 2 O(K^2 + K 10^3) a pixel; rung 3 some
+/// Cost     rung 1 1.4 times SolveLambertian; rung 2 O(K^2 + K 10^3) a pixel; rung 3 some
 ///          microseconds a pixel and 0.1 s to find; the same bits for any number of threads
 /// Source   the search over triples is exhaustive RANSAC (Fischler and Bolles 1981) with the cost of
 ///          sparse regression (log-sum: Candes, Wakin and Boyd 2008); the band is position

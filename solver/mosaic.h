@@ -42,7 +42,7 @@ using BandSink = std::function<Status(int first_row, const NormalField& band)>;
 ///     rho_c elsewhere = the mean of the nearest solved sites of colour c (bilinear)            (5)
 ///
 /// c is the site's colour, r_k its reading, N^0 the same without weights. Usable is as in
-/// solver/lambertian.h, with the reading in place of three samples. Uncertainty, misfit and rung 2
+/// solver/lambertian.h, with the reading in place of three samples. Uncertainties, misfit and rung 2
 /// are those of solver/ladder.h with one channel; the noise is the sensor's own, s = 1, because no
 /// interpolation has changed it. Where the stack does not know it, solver/mosaic_noise.h measures a gain. Rung 2 also searches in the colours interpolated from a site's
 /// neighbours, and takes what it finds where samples spread less than half as much and as many agree:

@@ -16,6 +16,16 @@ using testing::ReasonAt;
 using testing::RippleOf;
 using testing::TwoRings;
 
+// Root mean square of the albedo's error over its uncertainty; 1 = honest.
+double StandardisedAlbedoError(const NormalField& field, const RenderedRelief& truth) {
+  const Image<float> error = AlbedoErrorMap(field, truth.albedo).value();
+  double squares = 0.0;
+  for (size_t p = 0; p < error.pixels.size(); ++p) {
+    squares += std::pow(static_cast<double>(error.pixels[p] / field.albedo_uncertainty.pixels[p]), 2);
+  }
+  return std::sqrt(squares / static_cast<double>(error.pixels.size()));
+}
+
 TEST(SolveLadder, UncertaintyIsTheActualErrorOverTwentyScenes) {
   // A factor of 1.2 in the uncertainty would be outside.
   for (unsigned scene_number = 0; scene_number < 20; ++scene_number) {
@@ -42,6 +52,8 @@ TEST(SolveLadder, UncertaintyIsTheActualErrorOverTwentyScenes) {
       EXPECT_NEAR(standardised, 1.0, known ? 0.05 : 0.1)
           << scene_number << (known ? "" : " unknown");
       EXPECT_GE(inside, 0.94 * static_cast<double>(count)) << scene_number;
+      EXPECT_NEAR(StandardisedAlbedoError(field, scene.rendered), 1.0, known ? 0.03 : 0.1)
+          << scene_number << (known ? "" : " unknown");
     }
   }
 }
