@@ -19,11 +19,13 @@ namespace sateen {
 ///     sd(delta)^2 = (|sd(s)|^2 - |sd(s) l|^2) / 2 d^2, or half of the square of that of the direction,
 ///     sd(epsilon) = that of the irradiance                                                     (2)
 ///     angle^2 = tr Q - n.Q n,  (d rho / rho)^2 = n.Q n,
-///     Q = sum_k g_k g_k^T (sd(delta)^2 (1 - c_k^2) + sd(epsilon)^2 c_k^2)   (3)
+///     Q = sum_k g_k g_k^T (sd(delta)^2 (1 - (n . l_k)^2) + sd(epsilon)^2 (n . l_k)^2)            (3)
 ///
-/// c_k = z . l_k stands for n . l_k, so that Q is one of the place alone; it is found in the middle of each
-/// tile of 64 x 64 pixels. Right to 6 % where the cloth lies flat and no light is in shadow; on slopes of 30
-/// degrees 11 to 15 % too small for directions and positions, 8 % too large for irradiances.
+/// both of which are forms of the fourth degree in n, whose coefficients are found in the middle of each
+/// tile of 64 x 64 pixels. A light that is in shadow at a pixel still counts there.
+///
+/// Right to 3 % for directions and irradiances, on slopes of 30 degrees, too; for positions 6 % too small, of
+/// the albedo 11 %, because what a shift does to the irradiance away from the table's middle is left out.
 class LightDoubt {
  public:
   // Nothing where no light of the rig has a standard deviation. The rig has been checked against the size.
@@ -34,10 +36,16 @@ class LightDoubt {
   void AddToRow(int row, size_t first, NormalField& field) const;
 
  private:
-  using Matrix = std::array<float, 6>;  // xx, yy, zz, xy, xz, yz of Q
+  // Coefficients of (3): with p = (x^2, y^2, z^2, 2 x y, 2 x z, 2 y z) of a unit n,
+  // angle^2 = p . across p and (d rho / rho)^2 = p . along p; of each the upper triangle, off the diagonal twice.
+  using Form = std::array<float, 21>;
+  struct Tile {
+    Form across;
+    Form along;
+  };
 
   int columns_ = 0;  // of tiles
-  std::vector<Matrix> tiles_;
+  std::vector<Tile> tiles_;
 };
 
 }  // namespace sateen

@@ -6,6 +6,7 @@
 #include <random>
 
 #include "solver/ladder.h"
+#include "solver/rungs.h"
 #include "tests/solver/ladder_cases.h"
 
 namespace sateen {
@@ -60,6 +61,8 @@ TEST(SolveLadder, FastAgreesWithThePlainForm) {
               (at(fast.albedo) - at(plain.albedo)).norm() < 1e-3F * at(plain.albedo).norm() &&
               std::abs(fast.uncertainty.pixels[p] - plain.uncertainty.pixels[p]) <
                   0.01F * plain.uncertainty.pixels[p] &&
+              std::abs(fast.albedo_uncertainty.pixels[p] - plain.albedo_uncertainty.pixels[p]) <
+                  0.01F * plain.albedo_uncertainty.pixels[p] &&
               fast.model.pixels[p] == plain.model.pixels[p];
           differ += same ? 0 : 1;
         }
@@ -203,9 +206,10 @@ TEST(Consensus, IsNotSureOfItselfWhereTheWrongSamplesAgree) {
   }
   const NormalField field = MustSolve(rendered.stack, rig, Forced(LadderMode::kConsensus));
   EXPECT_GT(ErrorOf(field, rendered).mean, 15.0);
-  // (12): 0.4 of the angle to rung 1, and more where samples are rejected.
+  // (12): 0.4 of the angle to rung 1, or of the albedo's change, and more where samples are rejected.
   const NormalField plain = MustSolve(rendered.stack, rig, Forced(LadderMode::kLeastSquares));
   size_t doubted = 0;
+  size_t albedo_doubted = 0;
   for (size_t p = 0; p < 2400; ++p) {
     double cosine = 0.0;
     for (size_t c = 0; c < 3; ++c) {
@@ -216,14 +220,21 @@ TEST(Consensus, IsNotSureOfItselfWhereTheWrongSamplesAgree) {
         static_cast<double>(field.uncertainty.pixels[p]) >= std::hypot(3.0, 0.4 * turned_deg) - 1e-3
             ? 1
             : 0;
+    const double change =
+        std::min(1.0, std::abs(static_cast<double>(AlbedoAt(plain, p) / AlbedoAt(field, p)) - 1.0));
+    albedo_doubted += static_cast<double>(field.albedo_uncertainty.pixels[p]) >=
+                              std::min(1.0, std::hypot(3.0 * kRadPerDeg, 0.4 * change)) - 1e-5
+                          ? 1
+                          : 0;
   }
   EXPECT_EQ(doubted, 2400U);
+  EXPECT_EQ(albedo_doubted, 2400U);
 }
 
 TEST(Consensus, RungOneIsDoubtedAsMuchAsPixelsClimb) {
   // Of 100 rows so many are spoiled; in the others least squares are exact.
   const Rig rig = TwoRings();
-  const auto doubt = [&](int spoiled_rows) {
+  const auto solve = [&](int spoiled_rows) {
     RenderedRelief rendered = Render(rig, {40, 100}, 15.0);
     RenderedRelief spoiled = rendered;
     Spoil(spoiled.stack, 3, 5);
@@ -233,8 +244,15 @@ TEST(Consensus, RungOneIsDoubtedAsMuchAsPixelsClimb) {
                     rendered.stack[k].rgb[c].pixels.begin());
       }
     }
-    return MustSolve(rendered.stack, rig).uncertainty.At(20, 95);
+    return MustSolve(rendered.stack, rig);
   };
+  const auto doubt = [&](int spoiled_rows) { return solve(spoiled_rows).uncertainty.At(20, 95); };
+  const auto albedo_doubt = [&](int spoiled_rows) {
+    return solve(spoiled_rows).albedo_uncertainty.At(20, 95);
+  };
+  EXPECT_LT(albedo_doubt(1), 2e-4F);
+  EXPECT_GT(albedo_doubt(11), 0.025F);
+  EXPECT_LT(albedo_doubt(11), 0.7F * albedo_doubt(30));
   EXPECT_LT(doubt(1), 0.01F);
   EXPECT_GT(doubt(11), 1.5F);
   EXPECT_LT(doubt(11), 0.7F * doubt(30));

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Core>
+#include <array>
 #include <cmath>
 #include <numbers>
 
@@ -156,6 +157,26 @@ TEST(LowFrequencyError, GrowsWithASlopeThatGrowsTowardsTheEdge) {
 TEST(LowFrequencyError, RefusesTruthOfAnotherSize) {
   EXPECT_EQ(LowFrequencyErrorDeg(TiltedRow({0.0}), UpwardTruth(2), 1.0).error().code,
             ErrorCode::kBadData);
+}
+
+TEST(AlbedoErrorMap, IsOfLuminanceOrOfASitesOwnColour) {
+  NormalField field = TiltedRow({0.0, 0.0, 0.0});
+  Image3 truth(ImageSize{3, 1});
+  for (size_t p = 0; p < 3; ++p) {
+    for (size_t c = 0; c < 3; ++c) {
+      truth[c].pixels[p] = 0.5F;
+      field.albedo[c].pixels[p] = std::array{0.6F, 0.5F, 0.45F}[c];
+    }
+  }
+  field.reason.pixels[2] = static_cast<uint8_t>(Reason::kDark);
+  const Image<float> of_luminance = AlbedoErrorMap(field, truth).value();
+  EXPECT_NEAR(of_luminance.pixels[0], 0.2126 * 0.2 - 0.0722 * 0.1, 1e-6);
+  EXPECT_EQ(of_luminance.pixels[2], 0.0F);
+  const std::array<uint8_t, 4> cfa = {0, 2, 1, 1};
+  const Image<float> of_sites = AlbedoErrorMap(field, truth, &cfa).value();
+  EXPECT_NEAR(of_sites.pixels[0], 0.2, 1e-6);
+  EXPECT_NEAR(of_sites.pixels[1], 0.1, 1e-6);
+  EXPECT_FALSE(AlbedoErrorMap(field, Image3(ImageSize{2, 1})));
 }
 
 TEST(RelativeAlbedoError, IsRelativeToTheTruthOfEachChannel) {

@@ -147,6 +147,7 @@ TEST(SolveLadder, AnyNumberOfThreadsGivesTheSameBits) {
     const NormalField many = MustSolve(rendered.stack, rig, {}, threads);
     EXPECT_TRUE(SameBits(one, many));
     EXPECT_EQ(one.uncertainty.pixels, many.uncertainty.pixels);
+    EXPECT_EQ(one.albedo_uncertainty.pixels, many.albedo_uncertainty.pixels);
     EXPECT_EQ(one.model.pixels, many.model.pixels);
   }
 }

@@ -101,23 +101,31 @@ inline MosaicOptions Ladder(LadderMode mode, Backend backend = Backend::kAuto) {
 struct ErrorsAndUncertainty {
   double actual_over_predicted = 0.0;  // of the root mean squares
   double standardised = 0.0;           // root mean square of error over uncertainty
+  double standardised_albedo = 0.0;    // the same of the sites' own colours
 };
 
-inline ErrorsAndUncertainty CompareErrors(const NormalField& field, const RenderedRelief& truth) {
+inline ErrorsAndUncertainty CompareErrors(const NormalField& field, const RenderedRelief& truth,
+                                          const std::array<uint8_t, 4>& cfa) {
   Image<float> error_deg;
   EXPECT_TRUE(AngularErrorDeg(field, truth.normal, &error_deg));
   double squares = 0.0;
   double predicted = 0.0;
   double standardised = 0.0;
+  double standardised_albedo = 0.0;
+  const Image<float> albedo_error = AlbedoErrorMap(field, truth.albedo, &cfa).value();
   for (size_t p = 0; p < error_deg.pixels.size(); ++p) {
     const auto e = static_cast<double>(error_deg.pixels[p]);
     const auto u = static_cast<double>(field.uncertainty.pixels[p]);
     squares += e * e;
     predicted += u * u;
     standardised += e * e / (u * u);
+    standardised_albedo += std::pow(
+        static_cast<double>(albedo_error.pixels[p] / field.albedo_uncertainty.pixels[p]), 2.0);
   }
   return {.actual_over_predicted = std::sqrt(squares / predicted),
-          .standardised = std::sqrt(standardised / static_cast<double>(error_deg.pixels.size()))};
+          .standardised = std::sqrt(standardised / static_cast<double>(error_deg.pixels.size())),
+          .standardised_albedo =
+              std::sqrt(standardised_albedo / static_cast<double>(error_deg.pixels.size()))};
 }
 
 }  // namespace sateen::testing

@@ -25,7 +25,7 @@ TEST(MosaicNoise, NoiseThatIsNotKnownIsMeasured) {
   const NormalField whole = readings.Solve(rig);
   EXPECT_FALSE(whole.summary.noise_known);
   EXPECT_NEAR(whole.summary.noise_scale, std::sqrt(kGainDn), 0.05 * std::sqrt(kGainDn));
-  EXPECT_NEAR(CompareErrors(whole, truth).standardised, 1.0, 0.07);
+  EXPECT_NEAR(CompareErrors(whole, truth, readings.stack.cfa).standardised, 1.0, 0.07);
   EXPECT_LT(whole.summary.robust.pixels, whole.summary.solved / 200);
 
   // A mask between the rows that would be looked at without one.
@@ -104,6 +104,7 @@ TEST(MosaicNoise, LightsThatAreUncertainMakeNormalsUncertain) {
     doubt.AddToRow(row, sure.reason.Index(0, row), expected);
     for (int x = 0; x < 96; ++x) {
       ASSERT_FLOAT_EQ(unsure.uncertainty.At(x, row), expected.uncertainty.At(x, row));
+      ASSERT_FLOAT_EQ(unsure.albedo_uncertainty.At(x, row), expected.albedo_uncertainty.At(x, row));
       ASSERT_GT(unsure.uncertainty.At(x, row), 0.3F);
     }
   }
@@ -121,6 +122,7 @@ TEST(MosaicNoise, ThreeLightsAndNoNeighboursTellNothingOfTheNoise) {
   EXPECT_EQ(field.summary.solved, kSize.height);
   EXPECT_EQ(field.summary.noise_scale, 0.0);
   EXPECT_EQ(field.uncertainty.At(40, 9), 180.0F);
+  EXPECT_EQ(field.albedo_uncertainty.At(40, 9), 1.0F);
 }
 
 }  // namespace

@@ -87,6 +87,8 @@ TEST(MosaicTest, WeightsAgreeWithJacobiSvd) {
     for (size_t p = 0; p < fast.reason.pixels.size(); ++p) {
       ASSERT_NEAR(fast.uncertainty.pixels[p], reference.uncertainty.pixels[p],
                   1e-3F * reference.uncertainty.pixels[p] + 1e-6F);
+      ASSERT_NEAR(fast.albedo_uncertainty.pixels[p], reference.albedo_uncertainty.pixels[p],
+                  1e-3F * reference.albedo_uncertainty.pixels[p] + 1e-8F);
     }
     EXPECT_EQ(fast.model.pixels, reference.model.pixels);
   }
@@ -139,9 +141,10 @@ TEST(MosaicTest, ErrorsAreWhatTheBoundAllowsAndTheUncertaintySays) {
   Readings readings(truth, rig);
   readings.AddNoise(11);
   const NormalField field = readings.Solve(rig);
-  const ErrorsAndUncertainty errors = CompareErrors(field, truth);
+  const ErrorsAndUncertainty errors = CompareErrors(field, truth, readings.stack.cfa);
   EXPECT_LT(errors.actual_over_predicted, 1.05);
   EXPECT_NEAR(errors.standardised, 1.0, 0.03);
+  EXPECT_NEAR(errors.standardised_albedo, 1.0, 0.03);
   EXPECT_LT(field.summary.robust.pixels, field.summary.solved * 3 / 1000);
 }
 
@@ -209,6 +212,7 @@ TEST(MosaicTest, BandsAndThreadsGiveTheSameBits) {
     NormalField joined;
     joined.Resize(kSize);
     joined.uncertainty = Image<float>(kSize);
+    joined.albedo_uncertainty = Image<float>(kSize);
     int expected_row = 0;
     const auto sink = [&](int first_row, const NormalField& band) {
       EXPECT_EQ(first_row, expected_row);
@@ -225,6 +229,7 @@ TEST(MosaicTest, BandsAndThreadsGiveTheSameBits) {
       put(band.samples, joined.samples);
       put(band.reason, joined.reason);
       put(band.uncertainty, joined.uncertainty);
+      put(band.albedo_uncertainty, joined.albedo_uncertainty);
       return Status();
     };
     MosaicOptions options;
@@ -233,6 +238,7 @@ TEST(MosaicTest, BandsAndThreadsGiveTheSameBits) {
     ASSERT_TRUE(summary) << summary.error().message;
     EXPECT_TRUE(SameBits(whole, joined)) << band_rows;
     EXPECT_EQ(whole.uncertainty.pixels, joined.uncertainty.pixels) << band_rows;
+    EXPECT_EQ(whole.albedo_uncertainty.pixels, joined.albedo_uncertainty.pixels) << band_rows;
     EXPECT_EQ(summary->solved, whole.summary.solved);
   }
 }
@@ -258,6 +264,7 @@ TEST(MosaicTest, UnsolvableSitesHaveTheirReason) {
       EXPECT_EQ(field.albedo[c].pixels[p], 0.0F);
     }
     EXPECT_EQ(field.uncertainty.pixels[p], 0.0F);
+    EXPECT_EQ(field.albedo_uncertainty.pixels[p], 0.0F);
   }
 }
 

@@ -107,6 +107,8 @@ TEST(SolveLadder, UncertaintyIsUnknownWhereNothingTellsOfTheNoise) {
   const NormalField field = SolveLadder(rendered.stack, rig, mask).value();
   EXPECT_EQ(field.uncertainty.At(0, 0), 0.0F);
   EXPECT_EQ(field.uncertainty.At(1, 0), 180.0F);
+  EXPECT_EQ(field.albedo_uncertainty.At(0, 0), 0.0F);
+  EXPECT_EQ(field.albedo_uncertainty.At(1, 0), 1.0F);
   EXPECT_EQ(field.summary.least_squares.mean_uncertainty_deg, 180.0);
   EXPECT_EQ(field.summary.noise_scale, 0.0);
 }
@@ -141,6 +143,19 @@ TEST(SolveLadder, UncertaintyOfInterpolatedColoursHoldsHowNormalsBend) {
   expect(21, 10, 4.0 * (normal(22, 10) - normal(21, 10)).squaredNorm() + bend(21, 10, 0, 1));
   expect(20, 11, bend(20, 11, 1, 0) + 4.0 * (normal(20, 12) - normal(20, 11)).squaredNorm());
   EXPECT_EQ(raw.uncertainty.At(20, 10), 0.0F);
+  // The same of the albedo's luminance, over that of the pixel.
+  const auto albedo = [&](int x, int y) {
+    return 0.2126 * static_cast<double>(raw.albedo[0].At(x, y)) +
+           0.7152 * static_cast<double>(raw.albedo[1].At(x, y)) +
+           0.0722 * static_cast<double>(raw.albedo[2].At(x, y));
+  };
+  const double in_x = albedo(29, 20) - 2.0 * albedo(30, 20) + albedo(31, 20);
+  const double in_y = albedo(30, 19) - 2.0 * albedo(30, 20) + albedo(30, 21);
+  EXPECT_NEAR(static_cast<double>(raw.albedo_uncertainty.At(30, 20)),
+              std::hypot(static_cast<double>(plain.albedo_uncertainty.At(30, 20)),
+                         0.5 * std::hypot(in_x, in_y) / albedo(30, 20)),
+              1e-6);
+  EXPECT_EQ(raw.albedo_uncertainty.At(20, 10), 0.0F);
   EXPECT_GT(raw.summary.least_squares.mean_uncertainty_deg,
             plain.summary.least_squares.mean_uncertainty_deg);
   EXPECT_EQ(raw.normal[0].pixels, plain.normal[0].pixels);
