@@ -57,14 +57,14 @@ nlohmann::json LadderToJson(const SolveSummary& summary) {
   robust["unexplained"] = summary.unexplained;
   nlohmann::json least_squares = ToJson(summary.least_squares);
   least_squares["unchecked"] = summary.unchecked;
-  nlohmann::json sheen = ToJson(summary.sheen);
-  sheen["alpha"] = summary.sheen_alpha;
-  sheen["strength"] = summary.sheen_strength;
+  nlohmann::json lobe = ToJson(summary.lobe);
+  lobe["alpha"] = summary.lobe_alpha;
+  lobe["strength"] = summary.lobe_strength;
   return {{"noise", summary.noise_known ? "known" : "estimated"},
           {"noise_scale", summary.noise_scale},
           {"least_squares", std::move(least_squares)},
           {"robust", std::move(robust)},
-          {"sheen", std::move(sheen)}};
+          {"lobe", std::move(lobe)}};
 }
 
 // What each rung did, a line each.
@@ -94,10 +94,10 @@ std::string LadderWords(const SolveSummary& summary) {
         "nearly no pixel is as the lights say: the cloth shines, or the rig's lights are not "
         "calibrated or not these (sateen calibrate lights, calibrate check)\n";
   }
-  if (summary.sheen_strength > 0.0) {
-    text += rung("sheen", summary.sheen) +
+  if (summary.lobe_strength > 0.0) {
+    text += rung("lobe", summary.lobe) +
             fmt::format("; the scene's fuzz has roughness {:.2f}, strength {:.2f}\n",
-                        summary.sheen_alpha, summary.sheen_strength);
+                        summary.lobe_alpha, summary.lobe_strength);
   }
   return text;
 }

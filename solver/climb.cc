@@ -26,7 +26,7 @@ bool NeedsConsensus(const Climb& climb, const NormalField& field, float misfit, 
   if (field.samples.pixels[pixel] <= 3) {
     return false;  // three samples always agree
   }
-  if (field.model.pixels[pixel] == static_cast<uint8_t>(Rung::kSheen)) {
+  if (field.model.pixels[pixel] == static_cast<uint8_t>(Rung::kLobe)) {
     return false;
   }
   if (climb.options.mode != LadderMode::kAuto) {
@@ -148,8 +148,8 @@ void ClimbPixels(const Climb& climb, const ListedPixels& listed, NormalField& fi
   JudgeConsensus(pixels, before, EstimatesAt(field, pixels, albedo), agreeing, field, summary);
 }
 
-// Rung 3 for those of `count` pixels that the scene's sheen explains, also where rung 1 does so by chance.
-void SolveUnderSheen(const Climb& climb, size_t first, size_t count, NormalField& field,
+// Rung 3 for those of `count` pixels that the scene's lobe explains, also where rung 1 does so by chance.
+void SolveUnderLobe(const Climb& climb, size_t first, size_t count, NormalField& field,
                      PieceSummary& summary) {
   PixelSystem system(climb.stack, climb.rig, climb.options.least_squares);
   const auto width = static_cast<size_t>(field.reason.width);
@@ -163,10 +163,10 @@ void SolveUnderSheen(const Climb& climb, size_t first, size_t count, NormalField
     }
     const std::optional<Eigen::Vector3d> v = ViewOf(climb.rig, column, row);
     system.Gather(column, row);
-    const SheenAnswer answer =
-        v ? SolveSheen(SheenSamplesOf(system, climb.noise, *v), *climb.sheen) : SheenAnswer{};
-    if (answer.n.isZero() ||
-        !(answer.misfit <= static_cast<double>(climb.limit[field.samples.pixels[pixel]]))) {
+    const auto limit = static_cast<double>(climb.limit[field.samples.pixels[pixel]]);
+    const LobeAnswer answer =
+        v ? SolveLobe(LobeSamplesOf(system, climb.noise, *v, limit), *climb.lobe) : LobeAnswer{};
+    if (answer.n.isZero() || !(answer.misfit <= limit)) {
       continue;
     }
     const Eigen::Vector3d n = answer.n.normalized();
@@ -176,10 +176,10 @@ void SolveUnderSheen(const Climb& climb, size_t first, size_t count, NormalField
       field.albedo[c].pixels[pixel] = static_cast<float>(answer.albedo[column_of]);
     }
     field.residual.pixels[pixel] = static_cast<float>(answer.residual);
-    StoreSheenUncertainty(answer, noise_scale, field, pixel);
-    field.model.pixels[pixel] = static_cast<uint8_t>(Rung::kSheen);
-    summary.sheen_deg += static_cast<double>(field.uncertainty.pixels[pixel]);
-    ++summary.sheen;
+    StoreLobeUncertainty(answer, noise_scale, field, pixel);
+    field.model.pixels[pixel] = static_cast<uint8_t>(Rung::kLobe);
+    summary.lobe_deg += static_cast<double>(field.uncertainty.pixels[pixel]);
+    ++summary.lobe;
   }
 }
 
@@ -196,9 +196,9 @@ void SolvePiece(const Climb& climb, int begin, int end, NormalField& field, Piec
   for (int row = begin; climb.light_doubt && row < end; ++row) {
     climb.light_doubt->AddToRow(row, field.reason.Index(0, row), field);
   }
-  if (climb.sheen) {
-    summary.sheen_seconds +=
-        SecondsOf([&] { SolveUnderSheen(climb, first, count, field, summary); });
+  if (climb.lobe) {
+    summary.lobe_seconds +=
+        SecondsOf([&] { SolveUnderLobe(climb, first, count, field, summary); });
   }
   summary.unchecked += CountOf(static_cast<uint8_t>(Rung::kUnchecked),
                                std::span(field.model.pixels).subspan(first, count));
@@ -241,8 +241,8 @@ PieceSummary SolveAndClimb(const Climb& climb, int begin, int end, NormalField& 
   for (int row = begin; row < end; row += step) {
     SolvePiece(climb, row, std::min(end, row + step), field, summary, climbers);
   }
-  summary.least_squares_deg -= summary.sheen_deg;
-  summary.least_squares = summary.counts.solved - summary.unchecked - summary.sheen -
+  summary.least_squares_deg -= summary.lobe_deg;
+  summary.least_squares = summary.counts.solved - summary.unchecked - summary.lobe -
                           static_cast<int64_t>(climbers.pixels.size());
   if (!climbers.pixels.empty()) {
     summary.climbing_seconds = SecondsOf([&] { ClimbPixels(climb, climbers, field, summary); });

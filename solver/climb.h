@@ -7,7 +7,7 @@
 #include "solver/least_squares.h"
 #include "solver/light_doubt.h"
 #include "solver/rungs.h"
-#include "solver/sheen.h"
+#include "solver/lobe.h"
 
 namespace sateen {
 
@@ -21,7 +21,7 @@ struct Climb {
   double scale_squared = 1.0;         // s^2
   std::array<float, 256> limit = {};  // of the misfit, by usable samples
   std::optional<LightDoubt> light_doubt;
-  std::optional<Sheen> sheen;
+  std::optional<Lobe> lobe;
 };
 
 // The limits of equation (5)'s misfits.

@@ -37,7 +37,13 @@ inline constexpr float kLeastModelUncertainty = 0.0523598776F;  // 3 degrees
 // (12): of what two estimates differ by, so much is doubt about the better one.
 inline constexpr float kUncertaintyOfTurn = 0.4F;
 
-// What a cloth differs by from the sheen it is given: half a degree.
-inline constexpr double kSheenUncertainty = 0.00872664626;
+// Of the albedo: gloss so rough that it is in all samples alike goes into it, of a dielectric (4 % of the
+// light, some lobe) some 0.05.
+inline constexpr double kGlossInAlbedo = 0.05;
+
+// What a cloth differs by from the lobe it is given: half a degree.
+inline constexpr double kLobeUncertainty = 0.00872664626;
+// ... and of the albedo that part of the lobe itself.
+inline constexpr double kUncertaintyOfLobe = 0.1;
 
 }  // namespace sateen

@@ -106,17 +106,17 @@ Status DoubtInterpolation(const Task& task, NormalField& field, PieceSummary& to
                         : 1.0F;
         const auto rung = static_cast<Rung>(field.model.pixels[p]);
         double& sum = rung <= Rung::kUnchecked ? sums.least_squares_deg
-                      : rung == Rung::kSheen   ? sums.sheen_deg
+                      : rung == Rung::kLobe   ? sums.lobe_deg
                                                : sums.robust_deg;
         sum += static_cast<double>(uncertainty);
       }
     }
   });
-  total.least_squares_deg = total.robust_deg = total.sheen_deg = 0.0;
+  total.least_squares_deg = total.robust_deg = total.lobe_deg = 0.0;
   for (const PieceSummary& row : rows) {
     total.least_squares_deg += row.least_squares_deg;
     total.robust_deg += row.robust_deg;
-    total.sheen_deg += row.sheen_deg;
+    total.lobe_deg += row.lobe_deg;
   }
   return status;
 }
@@ -215,7 +215,8 @@ Status SolveLadderInto(const LightStack& stack, const Rig& rig, const std::optio
   const NoiseScale scale = FindNoiseScale(stack, mask, *rows, known);
   Climb climb = MakeClimb(stack, rig, options, *rows, noise, scale.scale_squared);
   if (options.mode == LadderMode::kAuto) {
-    climb.sheen = FindSheen(stack, rig, options.least_squares, noise, scale.sample, climb.limit);
+    climb.lobe = FindLobe(stack, rig, options.least_squares, noise, scale.sample, climb.limit,
+                          task.ThreadCount());
   }
   PieceSummary total;
   if (Status status = ClimbAllRows(climb, task, field, total); !status) {
@@ -231,9 +232,10 @@ Status SolveLadderInto(const LightStack& stack, const Rig& rig, const std::optio
   FinishSummary(options.least_squares, task, summary);
   summary.noise_scale = std::isfinite(climb.scale_squared) ? std::sqrt(climb.scale_squared) : 0.0;
   summary.noise_known = known;
-  if (climb.sheen) {
-    summary.sheen_alpha = climb.sheen->alpha;
-    summary.sheen_strength = climb.sheen->strength;
+  if (climb.lobe) {
+    summary.lobe_model = Name(climb.lobe->model);
+    summary.lobe_alpha = climb.lobe->alpha;
+    summary.lobe_strength = climb.lobe->strength;
   }
   summary.seconds = SecondsSince(start);
   ReportRungs(total, summary);

@@ -85,7 +85,7 @@ struct LadderOptions {
 /// check, is kUnchecked. Where from 2 to 20 of 100 pixels take this rung, rung 1's uncertainty gets 0 to
 /// all of hypot(3 degrees, 0.4 t), t in the mean of those pixels; kUnchecked all of t.
 ///
-/// Rung 3, a sheen that the scene has in common, where the rig has a camera, at kAuto:
+/// Rung 3, a lobe that the scene has in common, where the rig has a camera, at kAuto:
 ///
 ///     i'_k = N . l_k + s_k(n),  s_k = a pi f(n, l_k, v) max(0, n . l_k), f = Cloth of
 ///     reflectance/specular.h with F0 = 0.04, roughness alpha, v towards the camera           (13)

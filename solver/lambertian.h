@@ -61,7 +61,7 @@ enum class Rung : uint8_t {
   kLeastSquares = 64,  // weighted least squares explain the samples
   kUnchecked = 96,     // the same with three samples, so that no residual is left to tell
   kConsensus = 128,    // samples that agree, against others that do not
-  kSheen = 192,        // a Lambertian body under a sheen that the scene has in common
+  kLobe = 192,        // a Lambertian body under a lobe that the scene has in common
   kUnexplained = 255   // fewer than four samples agree: do not trust
 };
 
@@ -83,9 +83,10 @@ struct SolveSummary {
   // SolveLadder alone. `robust` counts kUnexplained, too.
   RungSummary least_squares;
   RungSummary robust;
-  RungSummary sheen;
-  double sheen_alpha = 0.0;  // what the scene has in common; 0: no sheen
-  double sheen_strength = 0.0;
+  RungSummary lobe;
+  std::string_view lobe_model;  // what the scene has in common; empty: no lobe
+  double lobe_alpha = 0.0;
+  double lobe_strength = 0.0;
   int64_t unexplained = 0;
   int64_t unchecked = 0;
   double turned_deg = 0.0;   // mean angle by which rung 2 turned its pixels' normals

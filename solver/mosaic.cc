@@ -16,7 +16,7 @@
 #include "solver/mosaic_rungs.h"
 #include "solver/mosaic_site.h"
 #include "solver/rungs.h"
-#include "solver/sheen.h"
+#include "solver/lobe.h"
 
 namespace sateen {
 namespace {
@@ -104,7 +104,7 @@ bool SolveRowAlone(const MosaicJob& job, int row, PieceSummary& summary, std::ve
   return true;
 }
 
-// What some rows tell before the others are solved: whether the scene has a sheen, and how far rung 1 is
+// What some rows tell before the others are solved: whether the scene has a lobe, and how far rung 1 is
 // to be doubted in what noise hides.
 class Probe {
  public:
@@ -113,11 +113,11 @@ class Probe {
   Status Run(const Task& task) {
     const Task silent{.threads = task.threads, .progress = nullptr, .cancel = task.cancel};
     Status status = SolveRows(silent);
-    // One colour's noise hides more of a sheen than three colours' does, so that already a few sites
+    // One colour's noise hides more of a lobe than three colours' does, so that already a few sites
     // that climb are a reason to look.
     if (status && job_.rig.camera && !DoubtOf(total_).IsNone()) {
-      job_.sheen = FindSheenOfSites();
-      status = job_.sheen ? SolveRows(silent) : status;
+      job_.lobe = FindLobeOfSites(task.ThreadCount());
+      status = job_.lobe ? SolveRows(silent) : status;
     }
     job_.doubt = DoubtOf(total_);
     return status;
@@ -142,10 +142,10 @@ class Probe {
     return status && !is_read ? tl::unexpected(CannotReadBack(job_.stack)) : status;
   }
 
-  [[nodiscard]] std::optional<Sheen> FindSheenOfSites() const {
+  [[nodiscard]] std::optional<Lobe> FindLobeOfSites(int threads) const {
     MosaicSite site(job_.stack, job_.rig, job_.options.least_squares, true);
-    std::vector<SheenSamples> samples;
-    const int columns = static_cast<int>(kSheenPixels / places_.size()) + 1;
+    std::vector<LobeSamples> samples;
+    const int columns = static_cast<int>(kLobePixels / places_.size()) + 1;
     for (const int row : places_) {
       MosaicPiece piece;
       job_.feed.Read(row, row + 1, piece);
@@ -155,8 +155,8 @@ class Probe {
         const bool is_inside = job_.mask == nullptr || job_.mask->At(column, row) != 0;
         const std::optional<Eigen::Vector3d> v =
             is_inside ? ViewOf(job_.rig, column, row) : std::nullopt;
-        SheenSamples of_site = v ? site.SheenSamplesAt(column, row, piece, *v) : SheenSamples{};
-        if (of_site.l.rows() >= kFewestForSheen) {
+        LobeSamples of_site = v ? site.LobeSamplesAt(column, row, piece, *v) : LobeSamples{};
+        if (of_site.l.rows() >= kFewestForLobe) {
           // As the maps count samples: 255 stands for more.
           of_site.limit = static_cast<double>(
               job_.limit[static_cast<size_t>(std::min<Eigen::Index>(of_site.l.rows(), 255))]);
@@ -164,7 +164,7 @@ class Probe {
         }
       }
     }
-    return SearchSheen(samples);
+    return SearchLobe(samples, threads);
   }
 
   MosaicJob& job_;
@@ -185,9 +185,10 @@ SolveSummary SummaryOf(const PieceSummary& total, const MosaicJob& job, bool is_
     const double gain = job.stack.lit[0].gain_dn;
     summary.noise_scale = is_noise_known ? 1.0 : gain < kUnknownGain ? std::sqrt(gain) : 0.0;
   }
-  if (job.sheen) {
-    summary.sheen_alpha = job.sheen->alpha;
-    summary.sheen_strength = job.sheen->strength;
+  if (job.lobe) {
+    summary.lobe_model = Name(job.lobe->model);
+    summary.lobe_alpha = job.lobe->alpha;
+    summary.lobe_strength = job.lobe->strength;
   }
   summary.backend = job.options.least_squares.backend;
   if (summary.backend == Backend::kFast || summary.backend == Backend::kAuto) {

@@ -46,7 +46,7 @@ using BandSink = std::function<Status(int first_row, const NormalField& band)>;
 /// are those of solver/ladder.h with one channel; the noise is the sensor's own, s = 1, because no
 /// interpolation has changed it. Where the stack does not know it, solver/mosaic_noise.h measures a gain. Rung 2 also searches in the colours interpolated from a site's
 /// neighbours, and takes what it finds where samples spread less than half as much and as many agree:
-/// highlights on coloured cloth. A sheen (rung 3) is looked for where more than 2 of 100 sites of some
+/// highlights on coloured cloth. A lobe (rung 3) is looked for where more than 2 of 100 sites of some
 /// rows climb.
 ///
 /// stack    K lit mosaics of H x W

@@ -69,8 +69,8 @@ bool MustClimb(const MosaicJob& job, SiteRows& rows, size_t p) {
              static_cast<float>(job.options.explained_residual) * rows.OwnColour(p);
 }
 
-// Rung 3: for those sites that the scene's sheen explains.
-void SolveSitesUnderSheen(const MosaicJob& job, const MosaicPiece& piece, SiteRows& rows,
+// Rung 3: for those sites that the scene's lobe explains.
+void SolveSitesUnderLobe(const MosaicJob& job, const MosaicPiece& piece, SiteRows& rows,
                           PieceSummary& summary) {
   MosaicSite site(job.stack, job.rig, job.options.least_squares, true);
   NormalField& field = rows.Field();
@@ -82,10 +82,10 @@ void SolveSitesUnderSheen(const MosaicJob& job, const MosaicPiece& piece, SiteRo
       if (!v) {
         continue;
       }
-      const SheenAnswer answer =
-          SolveSheen(site.SheenSamplesAt(column, row, piece, *v), *job.sheen);
-      if (answer.n.isZero() ||
-          !(answer.misfit <= static_cast<double>(job.limit[field.samples.pixels[p]]))) {
+      LobeSamples samples = site.LobeSamplesAt(column, row, piece, *v);
+      samples.limit = static_cast<double>(job.limit[field.samples.pixels[p]]);
+      const LobeAnswer answer = SolveLobe(samples, *job.lobe);
+      if (answer.n.isZero() || !(answer.misfit <= samples.limit)) {
         continue;
       }
       const Eigen::Vector3d n = answer.n.normalized();
@@ -94,15 +94,15 @@ void SolveSitesUnderSheen(const MosaicJob& job, const MosaicPiece& piece, SiteRo
       }
       rows.OwnColour(p) = static_cast<float>(answer.albedo[0]);
       field.residual.pixels[p] = static_cast<float>(answer.residual);
-      StoreSheenUncertainty(answer, 1.0, field, p);
-      field.model.pixels[p] = static_cast<uint8_t>(Rung::kSheen);
-      summary.sheen_deg += static_cast<double>(field.uncertainty.pixels[p]);
-      ++summary.sheen;
+      StoreLobeUncertainty(answer, 1.0, field, p);
+      field.model.pixels[p] = static_cast<uint8_t>(Rung::kLobe);
+      summary.lobe_deg += static_cast<double>(field.uncertainty.pixels[p]);
+      ++summary.lobe;
     }
   }
 }
 
-// Rung 1's word on the piece's sites, rung 3's where the scene has a sheen, then rung 2's on those that
+// Rung 1's word on the piece's sites, rung 3's where the scene has a lobe, then rung 2's on those that
 // climb.
 void ClimbSites(const MosaicJob& job, const MosaicPiece& piece, SiteRows& rows,
                 PieceSummary& summary) {
@@ -113,15 +113,15 @@ void ClimbSites(const MosaicJob& job, const MosaicPiece& piece, SiteRows& rows,
   std::fill(field.model.pixels.begin() + static_cast<std::ptrdiff_t>(begin),
             field.model.pixels.begin() + static_cast<std::ptrdiff_t>(end),
             static_cast<uint8_t>(Rung::kNone));
-  if (job.sheen) {
-    summary.sheen_seconds += SecondsOf([&] { SolveSitesUnderSheen(job, piece, rows, summary); });
+  if (job.lobe) {
+    summary.lobe_seconds += SecondsOf([&] { SolveSitesUnderLobe(job, piece, rows, summary); });
   }
   for (size_t p = begin; p < end; ++p) {
     if (!IsSolved(field, p)) {
       field.uncertainty.pixels[p] = field.albedo_uncertainty.pixels[p] = 0.0F;
       continue;
     }
-    if (field.model.pixels[p] == static_cast<uint8_t>(Rung::kSheen)) {
+    if (field.model.pixels[p] == static_cast<uint8_t>(Rung::kLobe)) {
       continue;
     }
     const Rung rung = field.samples.pixels[p] <= 3 ? Rung::kUnchecked : Rung::kLeastSquares;

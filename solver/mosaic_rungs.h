@@ -9,7 +9,7 @@
 #include "solver/mosaic.h"
 #include "solver/mosaic_feed.h"
 #include "solver/rungs.h"
-#include "solver/sheen.h"
+#include "solver/lobe.h"
 
 namespace sateen {
 
@@ -24,7 +24,7 @@ struct MosaicJob {
   const std::array<float, 256>& limit;  // of the misfit, by usable readings
   const std::optional<LightDoubt>& light_doubt;
   Doubt doubt;
-  std::optional<Sheen> sheen;
+  std::optional<Lobe> lobe;
 };
 
 // All rungs for rows [begin, end), into `rows`. False where their readings cannot be read.

@@ -139,7 +139,7 @@ double MosaicSite::WeightOf(Eigen::Index k, size_t site, const Eigen::Vector3d& 
   return e_[k] * e_[k] / (noise.shot * predicted * e_[k] + noise.read_squared);  // (2)
 }
 
-SheenSamples MosaicSite::SheenSamplesAt(int column, int row, const MosaicPiece& piece,
+LobeSamples MosaicSite::LobeSamplesAt(int column, int row, const MosaicPiece& piece,
                                         const Eigen::Vector3d& v) {
   std::vector<uint16_t> readings(stack_.lit.size());
   const size_t at =
@@ -153,7 +153,7 @@ SheenSamples MosaicSite::SheenSamplesAt(int column, int row, const MosaicPiece& 
   if (solution.reason != Reason::kSolved) {
     return {};
   }
-  SheenSamples samples{.l = l_.topRows(solution.samples), .v = v};
+  LobeSamples samples{.l = l_.topRows(solution.samples), .v = v};
   samples.i = i_.head(solution.samples).replicate<1, 4>();
   const Eigen::Vector3d n =
       (samples.l.transpose() * samples.l).ldlt().solve(samples.l.transpose() * samples.i.col(3));

@@ -7,7 +7,7 @@
 #include "rig/rig.h"
 #include "solver/lambertian.h"
 #include "solver/mosaic_feed.h"
-#include "solver/sheen.h"
+#include "solver/lobe.h"
 
 namespace sateen {
 
@@ -34,7 +34,7 @@ class MosaicSite {
                                    float dark);
 
   // The usable readings of a site of the piece, for rung 3: of one colour, four times the same.
-  [[nodiscard]] SheenSamples SheenSamplesAt(int column, int row, const MosaicPiece& piece,
+  [[nodiscard]] LobeSamples LobeSamplesAt(int column, int row, const MosaicPiece& piece,
                                             const Eigen::Vector3d& v);
 
  private:

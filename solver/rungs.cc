@@ -26,16 +26,16 @@ void PieceSummary::Add(const PieceSummary& other) {
   AddCounts(other.counts, counts);
   least_squares += other.least_squares;
   robust += other.robust;
-  sheen += other.sheen;
+  lobe += other.lobe;
   unexplained += other.unexplained;
   unchecked += other.unchecked;
   least_squares_deg += other.least_squares_deg;
   robust_deg += other.robust_deg;
-  sheen_deg += other.sheen_deg;
+  lobe_deg += other.lobe_deg;
   turned_deg += other.turned_deg;
   albedo_change += other.albedo_change;
   climbing_seconds += other.climbing_seconds;
-  sheen_seconds += other.sheen_seconds;
+  lobe_seconds += other.lobe_seconds;
 }
 
 std::array<float, 256> MisfitLimits(double scale_squared, double false_alarms) {
@@ -75,6 +75,7 @@ void JudgeConsensus(std::span<const size_t> pixels, std::span<const Estimate> be
     const double rejected = 1.0 - static_cast<double>(agreeing[j]) /
                                       static_cast<double>(field.samples.pixels[pixels[j]]);
     const double factor = (1.0 + std::max(0.0, rejected)) * (is_explained ? 1.0 : kUnexplainedFactor);
+    const double of_gloss = albedo > 0.0 ? kGlossInAlbedo / albedo : 1.0;
     const auto doubt = [&](float of_spread, double difference) {
       return static_cast<float>(
           factor * std::hypot(static_cast<double>(of_spread),
@@ -83,7 +84,7 @@ void JudgeConsensus(std::span<const size_t> pixels, std::span<const Estimate> be
     float& uncertainty = field.uncertainty.pixels[pixels[j]];
     uncertainty = std::min(180.0F, doubt(uncertainty, turned_deg));
     float& of_albedo = field.albedo_uncertainty.pixels[pixels[j]];
-    of_albedo = std::min(1.0F, doubt(of_albedo, change));
+    of_albedo = std::min(1.0F, std::hypot(doubt(of_albedo, change), static_cast<float>(of_gloss)));
     summary.unexplained += is_explained ? 0 : 1;
     field.model.pixels[pixels[j]] =
         static_cast<uint8_t>(is_explained ? Rung::kConsensus : Rung::kUnexplained);
@@ -103,7 +104,7 @@ void Doubt::AddTo(NormalField& field, size_t pixel) const {
 }
 
 Doubt DoubtOf(const PieceSummary& total) {
-  const int64_t solved = total.least_squares + total.unchecked + total.robust + total.sheen;
+  const int64_t solved = total.least_squares + total.unchecked + total.robust + total.lobe;
   const double share =
       static_cast<double>(total.robust) / static_cast<double>(std::max<int64_t>(solved, 1));
   const auto doubt = static_cast<float>(
@@ -118,12 +119,13 @@ Doubt DoubtOf(const PieceSummary& total) {
           doubt * std::hypot(kLeastModelUncertainty, change)};
 }
 
-void StoreSheenUncertainty(const SheenAnswer& answer, double noise_scale, NormalField& field,
+void StoreLobeUncertainty(const LobeAnswer& answer, double noise_scale, NormalField& field,
                            size_t pixel) {
   field.uncertainty.pixels[pixel] = static_cast<float>(std::min(
-      180.0, std::hypot(answer.uncertainty_deg * noise_scale, kSheenUncertainty * kDegPerRad)));
+      180.0, std::hypot(answer.uncertainty_deg * noise_scale, kLobeUncertainty * kDegPerRad)));
   field.albedo_uncertainty.pixels[pixel] = static_cast<float>(
-      std::min(1.0, std::hypot(answer.albedo_uncertainty * noise_scale, kSheenUncertainty)));
+      std::min(1.0, std::hypot(answer.albedo_uncertainty * noise_scale, kLobeUncertainty,
+                               kUncertaintyOfLobe * answer.lobe_share)));
 }
 
 double SecondsOf(const std::function<void()>& work) {
@@ -138,11 +140,11 @@ void ReportRungs(const PieceSummary& total, SolveSummary& summary) {
   };
   summary.robust = {total.robust, total.climbing_seconds / std::max(1, summary.threads),
                     mean(total.robust_deg, total.robust)};
-  summary.sheen = {total.sheen, total.sheen_seconds / std::max(1, summary.threads),
-                   mean(total.sheen_deg, total.sheen)};
+  summary.lobe = {total.lobe, total.lobe_seconds / std::max(1, summary.threads),
+                   mean(total.lobe_deg, total.lobe)};
   summary.least_squares = {
       total.least_squares + total.unchecked,
-      std::max(0.0, summary.seconds - summary.robust.seconds - summary.sheen.seconds),
+      std::max(0.0, summary.seconds - summary.robust.seconds - summary.lobe.seconds),
       mean(total.least_squares_deg, total.least_squares + total.unchecked)};
   summary.turned_deg = mean(total.turned_deg, total.robust);
   summary.unexplained = total.unexplained;

@@ -9,7 +9,7 @@
 
 #include "imaging/color.h"
 #include "solver/lambertian.h"
-#include "solver/sheen.h"
+#include "solver/lobe.h"
 
 // What the ladders of solver/ladder.h and solver/mosaic.h share: how a pixel's rungs are judged, and what
 // is said of them.
@@ -20,16 +20,16 @@ struct PieceSummary {
   SolveSummary counts;
   int64_t least_squares = 0;
   int64_t robust = 0;
-  int64_t sheen = 0;
+  int64_t lobe = 0;
   int64_t unexplained = 0;
   int64_t unchecked = 0;
   double least_squares_deg = 0.0;  // sums
   double robust_deg = 0.0;
-  double sheen_deg = 0.0;
+  double lobe_deg = 0.0;
   double turned_deg = 0.0;
   double albedo_change = 0.0;
   double climbing_seconds = 0.0;
-  double sheen_seconds = 0.0;
+  double lobe_seconds = 0.0;
 
   void Add(const PieceSummary& other);
 };
@@ -73,9 +73,9 @@ struct Doubt {
 };
 [[nodiscard]] Doubt DoubtOf(const PieceSummary& total);
 
-// Of a pixel under a sheen: what noise does, `noise_scale` times what the answer says, and what a cloth
-// differs by from the sheen it is given.
-void StoreSheenUncertainty(const SheenAnswer& answer, double noise_scale, NormalField& field,
+// Of a pixel under a lobe: what noise does, `noise_scale` times what the answer says, and what a cloth
+// differs by from the lobe it is given.
+void StoreLobeUncertainty(const LobeAnswer& answer, double noise_scale, NormalField& field,
                            size_t pixel);
 
 [[nodiscard]] double SecondsOf(const std::function<void()>& work);
