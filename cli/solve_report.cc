@@ -51,15 +51,40 @@ nlohmann::json ToJson(const RungSummary& rung) {
           {"mean_uncertainty_deg", rung.mean_uncertainty_deg}};
 }
 
+std::string WordsOf(const Lobe& lobe) {
+  switch (lobe.model) {
+    case LobeModel::kCloth:
+      return fmt::format("; the scene's fuzz has roughness {:.2f}, strength {:.2f}\n", lobe.alpha,
+                         lobe.strength);
+    case LobeModel::kGgx:
+      return fmt::format("; the scene's gloss has roughness {:.2f}, strength {:.2f}\n", lobe.alpha,
+                         lobe.strength);
+    case LobeModel::kGgxAnisotropic:
+      return fmt::format(
+          "; the gloss of the scene's yarns has roughness {:.2f} across and {:.2f} along them, "
+          "strength {:.2f}; they lie at {:.0f} and {:.0f} degrees\n",
+          lobe.alpha, lobe.alpha_along, lobe.strength, std::fmod(lobe.azimuth_deg + 90.0, 180.0),
+          lobe.azimuth_deg);
+  }
+  return "\n";
+}
+
 nlohmann::json LadderToJson(const SolveSummary& summary) {
   nlohmann::json robust = ToJson(summary.robust);
   robust["turned_deg"] = summary.turned_deg;
   robust["unexplained"] = summary.unexplained;
   nlohmann::json least_squares = ToJson(summary.least_squares);
   least_squares["unchecked"] = summary.unchecked;
-  nlohmann::json lobe = ToJson(summary.lobe);
-  lobe["alpha"] = summary.lobe_alpha;
-  lobe["strength"] = summary.lobe_strength;
+  nlohmann::json lobe = ToJson(summary.under_lobe);
+  if (summary.lobe) {
+    lobe["model"] = Name(summary.lobe->model);
+    lobe["alpha"] = summary.lobe->alpha;
+    lobe["strength"] = summary.lobe->strength;
+    if (summary.lobe->model == LobeModel::kGgxAnisotropic) {
+      lobe["alpha_along"] = summary.lobe->alpha_along;
+      lobe["azimuth_deg"] = summary.lobe->azimuth_deg;
+    }
+  }
   return {{"noise", summary.noise_known ? "known" : "estimated"},
           {"noise_scale", summary.noise_scale},
           {"least_squares", std::move(least_squares)},
@@ -94,10 +119,8 @@ std::string LadderWords(const SolveSummary& summary) {
         "nearly no pixel is as the lights say: the cloth shines, or the rig's lights are not "
         "calibrated or not these (sateen calibrate lights, calibrate check)\n";
   }
-  if (summary.lobe_strength > 0.0) {
-    text += rung("lobe", summary.lobe) +
-            fmt::format("; the scene's fuzz has roughness {:.2f}, strength {:.2f}\n",
-                        summary.lobe_alpha, summary.lobe_strength);
+  if (summary.lobe) {
+    text += rung("lobe", summary.under_lobe) + WordsOf(*summary.lobe);
   }
   return text;
 }

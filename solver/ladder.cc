@@ -232,11 +232,7 @@ Status SolveLadderInto(const LightStack& stack, const Rig& rig, const std::optio
   FinishSummary(options.least_squares, task, summary);
   summary.noise_scale = std::isfinite(climb.scale_squared) ? std::sqrt(climb.scale_squared) : 0.0;
   summary.noise_known = known;
-  if (climb.lobe) {
-    summary.lobe_model = Name(climb.lobe->model);
-    summary.lobe_alpha = climb.lobe->alpha;
-    summary.lobe_strength = climb.lobe->strength;
-  }
+  summary.lobe = climb.lobe;
   summary.seconds = SecondsSince(start);
   ReportRungs(total, summary);
   return {};

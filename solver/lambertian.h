@@ -10,6 +10,7 @@
 #include "imaging/image.h"
 #include "imaging/light_stack.h"
 #include "rig/rig.h"
+#include "solver/lobe_term.h"
 
 namespace sateen {
 
@@ -83,10 +84,8 @@ struct SolveSummary {
   // SolveLadder alone. `robust` counts kUnexplained, too.
   RungSummary least_squares;
   RungSummary robust;
-  RungSummary lobe;
-  std::string_view lobe_model;  // what the scene has in common; empty: no lobe
-  double lobe_alpha = 0.0;
-  double lobe_strength = 0.0;
+  RungSummary under_lobe;
+  std::optional<Lobe> lobe;  // what the scene has in common, where it has one
   int64_t unexplained = 0;
   int64_t unchecked = 0;
   double turned_deg = 0.0;   // mean angle by which rung 2 turned its pixels' normals

@@ -19,9 +19,6 @@
 namespace sateen {
 namespace {
 
-constexpr double kLobeF0 = 0.04;
-constexpr double kLeastViewCosine = 1e-4;  // as reflectance/specular.h has it
-constexpr double kLeastSineSquared = 1e-4;  // of n and h, below which velvet is flat
 constexpr int kLobeSteps = 12;
 constexpr int kHalvings = 4;
 constexpr double kLobeConverged = 1e-6;  // of |N|
@@ -31,14 +28,39 @@ constexpr double kLobeExplains = 0.7;
 constexpr double kLobeImproves = 0.8;
 // No misfit counts for more than this many limits: outliers are not the lobe's to explain.
 constexpr double kMostOverLimit = 4.0;
-constexpr std::array kModels = {LobeModel::kCloth, LobeModel::kGgx};
 constexpr std::array kAlphas = {0.15, 0.2, 0.3, 0.4, 0.5, 0.65, 0.85};
 constexpr std::array kStrengths = {0.35, 0.7, 1.4, 2.8};
+constexpr std::array kYarnAlphas = {0.2, 0.35, 0.5};
+constexpr std::array kYarnRatios = {0.3, 0.55};
+constexpr std::array kYarnStrengths = {0.7, 1.4};
+constexpr std::array kYarnAzimuthsDeg = {0.0, 22.5, 45.0, 67.5};
 constexpr double kLeastAlpha = 0.1;
 constexpr int kRefinements = 6;
+constexpr double kAlphaStep = 0.05;
+constexpr double kAzimuthStepDeg = 8.0;
 constexpr size_t kCoarseStep = 4;  // of the pixels, on the grid of roughness and strength
-constexpr std::array<std::pair<int, int>, 8> kNeighbours = {
-    {{1, 0}, {-1, 0}, {0, 1}, {0, -1}, {1, -1}, {-1, 1}, {1, 1}, {-1, -1}}};
+// Steps of the search; roughness and strength also together, because they make up for each other along a
+// narrow valley.
+struct LobeMove {
+  int alpha = 0;
+  int strength = 0;
+  int along = 0;
+  int azimuth = 0;
+};
+constexpr std::array<LobeMove, 14> kLobeMoves = {{{1, 0},
+                                                  {-1, 0},
+                                                  {0, 1},
+                                                  {0, -1},
+                                                  {1, -1},
+                                                  {-1, 1},
+                                                  {1, 1},
+                                                  {-1, -1},
+                                                  {0, 0, 1},
+                                                  {0, 0, -1},
+                                                  {0, 1, 1},
+                                                  {0, -1, -1},
+                                                  {0, 0, 0, 1},
+                                                  {0, 0, 0, -1}}};
 
 // What a pixel has of a lobe under each light: values, and gradients in n as rows.
 struct LobeTerms {
@@ -52,43 +74,11 @@ void FillTerms(const LobeSamples& samples, const Lobe& lobe, const Eigen::Vector
   terms.values.resize(count);
   terms.gradients.resize(count, 3);
   for (Eigen::Index k = 0; k < count; ++k) {
-    const LobeTerm term = LobeTermOf(lobe, n, samples.l.row(k).transpose(), samples.v);
+    const LobeTerm term = LobeTermOf(lobe, n, samples.l.row(k).transpose(), samples.v,
+                                     samples.halves[static_cast<size_t>(k)]);
     terms.values[k] = term.value;
     terms.gradients.row(k) = term.gradient.transpose();
   }
-}
-
-// A factor of the lobe and its derivative.
-struct Factor {
-  double value;
-  double slope;
-};
-
-// reflectance/microfacet.h's VelvetDistribution in n . h.
-Factor VelvetOf(double n_h, double alpha) {
-  const double unit = 1.0 / (std::numbers::pi * (1.0 + 4.0 * alpha * alpha));
-  const double q = 1.0 - n_h * n_h;
-  if (q < kLeastSineSquared) {
-    return {unit, 0.0};
-  }
-  const double e = std::exp(-n_h * n_h / (q * alpha * alpha)) / (q * q);
-  return {unit * (1.0 + 4.0 * e),
-          unit * 4.0 * e * (4.0 * n_h / q - 2.0 * n_h / (alpha * alpha * q * q))};
-}
-
-// reflectance/microfacet.h's GgxDistribution in n . h.
-Factor GgxOf(double n_h, double alpha) {
-  const double a = alpha * alpha;
-  const double t = n_h * n_h * (a - 1.0) + 1.0;
-  const double d = a / (std::numbers::pi * t * t);
-  return {d, -4.0 * d * n_h * (a - 1.0) / t};
-}
-
-// x + sqrt(x^2 + alpha^2 (1 - x^2)): Smith's masking is 2 x over this.
-Factor SmithOf(double x, double alpha) {
-  const double a = alpha * alpha;
-  const double root = std::sqrt(x * x * (1.0 - a) + a);
-  return {x + root, 1.0 + x * (1.0 - a) / root};
 }
 
 // 1 / variance of the luminance, (1) of its samples at what least squares N^0 predict.
@@ -194,6 +184,10 @@ LobeFit FitFrom(const Eigen::Vector3d& start, const LobeSamples& samples, const 
   return fit;
 }
 
+Eigen::Vector3d LeastSquares(const LobeSamples& samples, const Lobe& /*lobe*/) {
+  return (samples.l.transpose() * samples.l).ldlt().solve(samples.l.transpose() * samples.i.col(3));
+}
+
 // Least squares of the darker half of the samples, at least four.
 Eigen::Vector3d DarkerHalf(const LobeSamples& samples, const Lobe& /*lobe*/) {
   std::vector<Eigen::Index> order(static_cast<size_t>(samples.l.rows()));
@@ -203,6 +197,47 @@ Eigen::Vector3d DarkerHalf(const LobeSamples& samples, const Lobe& /*lobe*/) {
   const Eigen::MatrixX3d l = samples.l(order, Eigen::all);
   const Eigen::VectorXd i = samples.i(order, 3);
   return (l.transpose() * l).ldlt().solve(l.transpose() * i);
+}
+
+bool Believed(const Score& score) {
+  return static_cast<double>(score.explained) >= kLobeExplains * static_cast<double>(score.count);
+}
+
+// The lobe changed by so many steps of its figures.
+Lobe Moved(const Lobe& lobe, const LobeMove& by, double step) {
+  Lobe moved = lobe;
+  moved.alpha = std::clamp(lobe.alpha + by.alpha * kAlphaStep * step, kLeastAlpha, 1.0);
+  moved.strength = lobe.strength * std::pow(2.0, 0.5 * by.strength * step);
+  if (lobe.model == LobeModel::kGgxAnisotropic) {
+    moved.alpha_along =
+        std::clamp(lobe.alpha_along * std::pow(2.0, 0.5 * by.along * step), kLeastAlpha / 2.0, 1.0);
+    moved.azimuth_deg = lobe.azimuth_deg + by.azimuth * kAzimuthStepDeg * step;
+  }
+  return moved;
+}
+
+// From `best` on a grid to the least sum over all pixels: half way to the neighbours, and so on.
+void Refine(const std::vector<LobeSamples>& pixels, int threads, Lobe& best, Score& least) {
+  least = ScoreOf(best, pixels, 1, threads);
+  double step = 1.0;
+  for (int j = 0; j < kRefinements; ++j, step *= 0.5) {
+    for (bool has_moved = true; has_moved;) {
+      has_moved = false;
+      const Lobe at = best;
+      for (const LobeMove& move : kLobeMoves) {
+        if (at.model != LobeModel::kGgxAnisotropic && (move.along != 0 || move.azimuth != 0)) {
+          continue;
+        }
+        const Lobe lobe = Moved(at, move, step);
+        const Score score = ScoreOf(lobe, pixels, 1, threads);
+        if (score.sum < least.sum) {
+          least = score;
+          best = lobe;
+          has_moved = true;
+        }
+      }
+    }
+  }
 }
 
 bool LeastSquaresExplain(const MisfitSample& sample, const std::array<float, 256>& limit) {
@@ -230,46 +265,42 @@ Eigen::Vector3d MirrorOfBrightest(const LobeSamples& samples, const Lobe& lobe) 
   return std::max(body, 0.05 * cosines.dot(samples.i.col(3)) / cosines.squaredNorm()) * unit;
 }
 
-}  // namespace
-
-std::string_view Name(LobeModel model) { return model == LobeModel::kCloth ? "cloth" : "ggx"; }
-
-LobeSamples LobeSamplesOf(const PixelSystem& system, const StackNoise& noise,
-                            const Eigen::Vector3d& v, double limit) {
-  LobeSamples samples{.l = system.L(), .i = system.Rhs(), .v = v, .limit = limit};
-  const Eigen::Matrix<double, 3, 4> n0 =
-      (samples.l.transpose() * samples.l).ldlt().solve(samples.l.transpose() * samples.i);
-  samples.weights = LuminanceWeightsOf(system, noise, n0);
-  return samples;
+// From the first of three starts that ends within the limit, or the best.
+LobeFit FitLobe(const LobeSamples& samples, const Lobe& lobe, double limit) {
+  LobeFit fit;
+  for (const auto& start : {LeastSquares, DarkerHalf, MirrorOfBrightest}) {
+    if (!(fit.chi_squared <= limit)) {
+      LobeFit other = FitFrom(start(samples, lobe), samples, lobe);
+      if (other.chi_squared < fit.chi_squared) {
+        fit = std::move(other);
+      }
+    }
+  }
+  return fit;
 }
 
-LobeTerm LobeTermOf(const Lobe& lobe, const Eigen::Vector3d& n, const Eigen::Vector3d& l,
-                    const Eigen::Vector3d& v) {
-  const double n_l = n.dot(l);
-  if (n_l <= 0.0) {
-    return {};
+}  // namespace
+
+LobeSamples::LobeSamples(Eigen::MatrixX3d directions, Eigen::MatrixX4d samples,
+                         Eigen::VectorXd by_variance, const Eigen::Vector3d& to_camera,
+                         double misfit_limit)
+    : l(std::move(directions)),
+      i(std::move(samples)),
+      weights(std::move(by_variance)),
+      v(to_camera),
+      limit(misfit_limit) {
+  halves.reserve(static_cast<size_t>(l.rows()));
+  for (Eigen::Index k = 0; k < l.rows(); ++k) {
+    halves.push_back(LobeHalfOf(l.row(k).transpose(), v));
   }
-  const Eigen::Vector3d h = (l + v).normalized();
-  const double v_h = std::clamp(v.dot(h), 0.0, 1.0);
-  const double fresnel = kLobeF0 + (1.0 - kLobeF0) * std::pow(1.0 - v_h, 5.0);
-  const double n_v = std::max(n.dot(v), kLeastViewCosine);
-  const double along_v = n.dot(v) > kLeastViewCosine ? 1.0 : 0.0;  // of the gradient
-  const double n_h = std::clamp(n.dot(h), 0.0, 1.0);
-  const double unit = lobe.strength * std::numbers::pi * fresnel;
-  if (lobe.model == LobeModel::kCloth) {
-    const Factor d = VelvetOf(n_h, lobe.alpha);
-    const double g = 4.0 * (n_l + n_v - n_l * n_v);
-    const double value = unit * d.value * n_l / g;
-    return {value, unit * d.slope * n_l / g * h + unit * d.value / g * l -
-                       value / g * 4.0 * ((1.0 - n_v) * l + along_v * (1.0 - n_l) * v)};
-  }
-  const Factor d = GgxOf(n_h, lobe.alpha);
-  const Factor of_l = SmithOf(n_l, lobe.alpha);
-  const Factor of_v = SmithOf(n_v, lobe.alpha);
-  const double visibility = 1.0 / (of_l.value * of_v.value);
-  const double value = unit * d.value * visibility * n_l;
-  return {value, unit * d.slope * visibility * n_l * h + unit * d.value * visibility * l -
-                     value * (of_l.slope / of_l.value * l + along_v * of_v.slope / of_v.value * v)};
+}
+
+LobeSamples LobeSamplesOf(const PixelSystem& system, const StackNoise& noise,
+                          const Eigen::Vector3d& v, double limit) {
+  const Eigen::MatrixX3d l = system.L();
+  const Eigen::Matrix<double, 3, 4> n0 =
+      (l.transpose() * l).ldlt().solve(l.transpose() * system.Rhs());
+  return {l, system.Rhs(), LuminanceWeightsOf(system, noise, n0), v, limit};
 }
 
 LobeAnswer SolveLobe(const LobeSamples& samples, const Lobe& lobe) {
@@ -279,13 +310,13 @@ LobeAnswer SolveLobe(const LobeSamples& samples, const Lobe& lobe) {
     return {};
   }
   const auto freedom = static_cast<double>(l.rows() - 3);
-  LobeFit fit = FitFrom((l.transpose() * l).ldlt().solve(l.transpose() * i.col(3)), samples, lobe);
-  for (const auto& start : {DarkerHalf, MirrorOfBrightest}) {
-    if (!(fit.chi_squared <= samples.limit * freedom)) {
-      LobeFit other = FitFrom(start(samples, lobe), samples, lobe);
-      if (other.chi_squared < fit.chi_squared) {
-        fit = std::move(other);
-      }
+  LobeFit fit = FitLobe(samples, lobe, samples.limit * freedom);
+  if (lobe.model == LobeModel::kGgxAnisotropic) {
+    Lobe crossed = lobe;
+    crossed.azimuth_deg += 90.0;
+    LobeFit other = FitLobe(samples, crossed, samples.limit * freedom);
+    if (other.chi_squared < fit.chi_squared) {
+      fit = std::move(other);
     }
   }
   LobeAnswer answer;
@@ -338,36 +369,39 @@ std::optional<Lobe> SearchLobe(const std::vector<LobeSamples>& pixels, int threa
     }
     return false;
   };
-  for (const LobeModel model : kModels) {
+  for (const LobeModel model : {LobeModel::kCloth, LobeModel::kGgx}) {
     for (const double alpha : kAlphas) {
       for (const double strength : kStrengths) {
-        attempt({model, alpha, strength}, kCoarseStep);
+        attempt({.model = model, .alpha = alpha, .strength = strength}, kCoarseStep);
       }
     }
   }
-  least = ScoreOf(best, pixels, 1, threads);
-  // Half way to the neighbours on the grid, and so on.
-  double alpha_step = 0.05;
-  double strength_factor = std::sqrt(2.0);
-  for (int j = 0; j < kRefinements; ++j) {
-    for (bool moved = true; moved;) {
-      moved = false;
-      const Lobe at = best;
-      // Eight neighbours, because roughness and strength make up for each other along a narrow valley.
-      for (const auto& [a, b] : kNeighbours) {
-        moved |= attempt({at.model, std::clamp(at.alpha + a * alpha_step, kLeastAlpha, 1.0),
-                          at.strength * std::pow(strength_factor, b)},
-                         1);
+  Refine(pixels, threads, best, least);
+  if (!Believed(least)) {
+    // Yarns: from gloss that is twice as rough across them as along.
+    const Lobe round = best;
+    const Score of_round = least;
+    least.sum = std::numeric_limits<double>::infinity();
+    for (const double alpha : kYarnAlphas) {
+      for (const double ratio : kYarnRatios) {
+        for (const double strength : kYarnStrengths) {
+          for (const double azimuth_deg : kYarnAzimuthsDeg) {
+            attempt({LobeModel::kGgxAnisotropic, alpha, strength, ratio * alpha, azimuth_deg},
+                    kCoarseStep);
+          }
+        }
       }
     }
-    alpha_step *= 0.5;
-    strength_factor = std::sqrt(strength_factor);
+    Refine(pixels, threads, best, least);
+    if (of_round.sum <= least.sum) {
+      best = round;
+      least = of_round;
+    }
   }
   const Score without = ScoreOf({.alpha = kAlphas.front(), .strength = 0.0}, pixels, 1, threads);
-  const bool believed =
-      least.sum < kLobeImproves * without.sum &&
-      static_cast<double>(least.explained) >= kLobeExplains * static_cast<double>(pixels.size());
-  return believed ? std::optional(best) : std::nullopt;
+  best.azimuth_deg = std::fmod(best.azimuth_deg + 360.0, 180.0);
+  return Believed(least) && least.sum < kLobeImproves * without.sum ? std::optional(best)
+                                                                    : std::nullopt;
 }
 
 std::optional<Lobe> FindLobe(const LightStack& stack, const Rig& rig,

@@ -155,12 +155,10 @@ class Probe {
         const bool is_inside = job_.mask == nullptr || job_.mask->At(column, row) != 0;
         const std::optional<Eigen::Vector3d> v =
             is_inside ? ViewOf(job_.rig, column, row) : std::nullopt;
-        LobeSamples of_site = v ? site.LobeSamplesAt(column, row, piece, *v) : LobeSamples{};
-        if (of_site.l.rows() >= kFewestForLobe) {
-          // As the maps count samples: 255 stands for more.
-          of_site.limit = static_cast<double>(
-              job_.limit[static_cast<size_t>(std::min<Eigen::Index>(of_site.l.rows(), 255))]);
-          samples.push_back(std::move(of_site));
+        std::optional<LobeSamples> of_site =
+            v ? site.LobeSamplesAt(column, row, piece, *v, job_.limit) : std::nullopt;
+        if (of_site && of_site->l.rows() >= kFewestForLobe) {
+          samples.push_back(*std::move(of_site));
         }
       }
     }
@@ -185,11 +183,7 @@ SolveSummary SummaryOf(const PieceSummary& total, const MosaicJob& job, bool is_
     const double gain = job.stack.lit[0].gain_dn;
     summary.noise_scale = is_noise_known ? 1.0 : gain < kUnknownGain ? std::sqrt(gain) : 0.0;
   }
-  if (job.lobe) {
-    summary.lobe_model = Name(job.lobe->model);
-    summary.lobe_alpha = job.lobe->alpha;
-    summary.lobe_strength = job.lobe->strength;
-  }
+  summary.lobe = job.lobe;
   summary.backend = job.options.least_squares.backend;
   if (summary.backend == Backend::kFast || summary.backend == Backend::kAuto) {
     summary.instruction_set = KernelInstructionSet();

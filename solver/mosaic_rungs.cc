@@ -82,10 +82,10 @@ void SolveSitesUnderLobe(const MosaicJob& job, const MosaicPiece& piece, SiteRow
       if (!v) {
         continue;
       }
-      LobeSamples samples = site.LobeSamplesAt(column, row, piece, *v);
-      samples.limit = static_cast<double>(job.limit[field.samples.pixels[p]]);
-      const LobeAnswer answer = SolveLobe(samples, *job.lobe);
-      if (answer.n.isZero() || !(answer.misfit <= samples.limit)) {
+      const std::optional<LobeSamples> samples =
+          site.LobeSamplesAt(column, row, piece, *v, job.limit);
+      const LobeAnswer answer = samples ? SolveLobe(*samples, *job.lobe) : LobeAnswer{};
+      if (answer.n.isZero() || !(answer.misfit <= samples->limit)) {
         continue;
       }
       const Eigen::Vector3d n = answer.n.normalized();

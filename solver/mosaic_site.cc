@@ -139,8 +139,9 @@ double MosaicSite::WeightOf(Eigen::Index k, size_t site, const Eigen::Vector3d& 
   return e_[k] * e_[k] / (noise.shot * predicted * e_[k] + noise.read_squared);  // (2)
 }
 
-LobeSamples MosaicSite::LobeSamplesAt(int column, int row, const MosaicPiece& piece,
-                                        const Eigen::Vector3d& v) {
+std::optional<LobeSamples> MosaicSite::LobeSamplesAt(int column, int row, const MosaicPiece& piece,
+                                                     const Eigen::Vector3d& v,
+                                                     const std::array<float, 256>& limit) {
   std::vector<uint16_t> readings(stack_.lit.size());
   const size_t at =
       static_cast<size_t>(row - piece.Begin()) * static_cast<size_t>(stack_.size_px.width) +
@@ -151,17 +152,18 @@ LobeSamples MosaicSite::LobeSamplesAt(int column, int row, const MosaicPiece& pi
   SiteSolution solution;
   Gather(column, row, readings, piece.Dark(at), solution);
   if (solution.reason != Reason::kSolved) {
-    return {};
+    return std::nullopt;
   }
-  LobeSamples samples{.l = l_.topRows(solution.samples), .v = v};
-  samples.i = i_.head(solution.samples).replicate<1, 4>();
-  const Eigen::Vector3d n =
-      (samples.l.transpose() * samples.l).ldlt().solve(samples.l.transpose() * samples.i.col(3));
-  samples.weights.resize(solution.samples);
+  const Eigen::MatrixX3d l = l_.topRows(solution.samples);
+  const Eigen::VectorXd i = i_.head(solution.samples);
+  const Eigen::Vector3d n = (l.transpose() * l).ldlt().solve(l.transpose() * i);
+  Eigen::VectorXd weights(solution.samples);
   for (Eigen::Index k = 0; k < solution.samples; ++k) {
-    samples.weights[k] = WeightOf(k, static_cast<size_t>(row % 2 * 2 + column % 2), n);
+    weights[k] = WeightOf(k, static_cast<size_t>(row % 2 * 2 + column % 2), n);
   }
-  return samples;
+  // As the maps count samples: 255 stands for more.
+  return LobeSamples(l, i.replicate<1, 4>(), weights, v,
+                     static_cast<double>(limit[static_cast<size_t>(std::min(solution.samples, 255))]));
 }
 
 void MosaicSite::Weigh(size_t site, SiteSolution& solution) const {

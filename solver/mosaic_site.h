@@ -1,6 +1,8 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
+#include <optional>
 #include <vector>
 
 #include "imaging/mosaic_stack.h"
@@ -33,9 +35,12 @@ class MosaicSite {
   [[nodiscard]] SiteSolution Solve(int column, int row, const std::vector<uint16_t>& readings,
                                    float dark);
 
-  // The usable readings of a site of the piece, for rung 3: of one colour, four times the same.
-  [[nodiscard]] LobeSamples LobeSamplesAt(int column, int row, const MosaicPiece& piece,
-                                            const Eigen::Vector3d& v);
+  // The usable readings of a site of the piece, for rung 3: of one colour, four times the same. `limit` of
+  // the misfit, by how many they are.
+  [[nodiscard]] std::optional<LobeSamples> LobeSamplesAt(int column, int row,
+                                                         const MosaicPiece& piece,
+                                                         const Eigen::Vector3d& v,
+                                                         const std::array<float, 256>& limit);
 
  private:
   // 1 / variance of usable reading k, at what N predicts.

@@ -140,11 +140,11 @@ void ReportRungs(const PieceSummary& total, SolveSummary& summary) {
   };
   summary.robust = {total.robust, total.climbing_seconds / std::max(1, summary.threads),
                     mean(total.robust_deg, total.robust)};
-  summary.lobe = {total.lobe, total.lobe_seconds / std::max(1, summary.threads),
+  summary.under_lobe = {total.lobe, total.lobe_seconds / std::max(1, summary.threads),
                    mean(total.lobe_deg, total.lobe)};
   summary.least_squares = {
       total.least_squares + total.unchecked,
-      std::max(0.0, summary.seconds - summary.robust.seconds - summary.lobe.seconds),
+      std::max(0.0, summary.seconds - summary.robust.seconds - summary.under_lobe.seconds),
       mean(total.least_squares_deg, total.least_squares + total.unchecked)};
   summary.turned_deg = mean(total.turned_deg, total.robust);
   summary.unexplained = total.unexplained;

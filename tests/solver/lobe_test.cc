@@ -83,7 +83,7 @@ TEST(Lobe, IsThatOfTheReflectanceModelAndItsGradient) {
         const Eigen::Vector3d n = direction(0.5);
         const Eigen::Vector3d l = direction(1.0);
         const Eigen::Vector3d v = direction(0.1);
-        const LobeTerm term = LobeTermOf(lobe, n, l, v);
+        const LobeTerm term = LobeTermOf(lobe, n, l, v, LobeHalfOf(l, v));
         const double value = ValueByReflectance(lobe, n, l, v);
         ASSERT_NEAR(term.value, value, 1e-9 * value + 1e-12) << Name(model) << " " << alpha;
         if (n.dot(l) < 0.05 || n.dot(v) < 0.05) {
@@ -117,10 +117,11 @@ TEST(Lobe, IsFoundAndTakenOutOfNormalAndAlbedo) {
     }
     const LadderOptions options = WithShotNoise(kElectrons, rig.lights.size());
     const NormalField field = MustSolve(rendered.stack, rig, options);
-    EXPECT_EQ(field.summary.lobe_model, Name(lobe.model));
-    EXPECT_NEAR(field.summary.lobe_alpha, lobe.alpha, 0.03);
-    EXPECT_NEAR(field.summary.lobe_strength, lobe.strength, 0.15);
-    EXPECT_GT(field.summary.lobe.pixels, 3072 * 9 / 10);
+    ASSERT_TRUE(field.summary.lobe);
+    EXPECT_EQ(field.summary.lobe->model, lobe.model);
+    EXPECT_NEAR(field.summary.lobe->alpha, lobe.alpha, 0.03);
+    EXPECT_NEAR(field.summary.lobe->strength, lobe.strength, 0.15);
+    EXPECT_GT(field.summary.under_lobe.pixels, 3072 * 9 / 10);
     LadderOptions plain = options;
     plain.mode = LadderMode::kLeastSquares;
     const NormalField without = MustSolve(rendered.stack, rig, plain);
@@ -146,8 +147,8 @@ TEST(Lobe, LambertianScenesHaveNone) {
   AddLobe(rig, kFuzz, 0, kElectrons, rendered);
   const NormalField field =
       MustSolve(rendered.stack, rig, WithShotNoise(kElectrons, rig.lights.size()));
-  EXPECT_EQ(field.summary.lobe_alpha, 0.0);
-  EXPECT_EQ(field.summary.lobe.pixels, 0);
+  EXPECT_FALSE(field.summary.lobe);
+  EXPECT_EQ(field.summary.under_lobe.pixels, 0);
 }
 
 TEST(Lobe, IsNotBelievedWhereItLeavesAThirdUnexplained) {
@@ -157,7 +158,7 @@ TEST(Lobe, IsNotBelievedWhereItLeavesAThirdUnexplained) {
   AddLobe(rig, kFuzz, 100, kElectrons, rendered);
   const NormalField field =
       MustSolve(rendered.stack, rig, WithShotNoise(kElectrons, rig.lights.size()));
-  EXPECT_EQ(field.summary.lobe.pixels, 0);
+  EXPECT_EQ(field.summary.under_lobe.pixels, 0);
   EXPECT_GT(field.summary.robust.pixels, 2000);
 }
 
@@ -167,7 +168,7 @@ TEST(Lobe, AnyNumberOfThreadsGivesTheSameBits) {
   AddLobe(rig, kFuzz, 97, kElectrons, rendered);
   const LadderOptions options = WithShotNoise(kElectrons, rig.lights.size());
   const NormalField one = MustSolve(rendered.stack, rig, options, 1);
-  EXPECT_GT(one.summary.lobe.pixels, 0);
+  EXPECT_GT(one.summary.under_lobe.pixels, 0);
   const NormalField many = MustSolve(rendered.stack, rig, options, 7);
   EXPECT_TRUE(testing::SameBits(one, many));
   EXPECT_EQ(one.model.pixels, many.model.pixels);
