@@ -7,6 +7,7 @@
 #include <limits>
 #include <numbers>
 #include <numeric>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -21,11 +22,14 @@ namespace {
 
 constexpr int kLobeSteps = 12;
 constexpr int kHalvings = 4;
-constexpr double kLobeConverged = 1e-6;  // of |N|
+constexpr double kLobeConverged = 1e-6;  // of chi^2
+constexpr double kLeastBody = 0.05;      // of least squares', to start from
 // A lobe is believed where it explains this share of the pixels that it is looked for on.
 constexpr double kLobeExplains = 0.7;
 // ... and takes at least a fifth off their misfits: chance takes a twentieth.
 constexpr double kLobeImproves = 0.8;
+// On the grid, which may miss its best figures, a tenth.
+constexpr double kCoarseImproves = 0.9;
 // No misfit counts for more than this many limits: outliers are not the lobe's to explain.
 constexpr double kMostOverLimit = 4.0;
 constexpr std::array kAlphas = {0.15, 0.2, 0.3, 0.4, 0.5, 0.65, 0.85};
@@ -62,23 +66,42 @@ constexpr std::array<LobeMove, 14> kLobeMoves = {{{1, 0},
                                                   {0, 0, 0, 1},
                                                   {0, 0, 0, -1}}};
 
-// What a pixel has of a lobe under each light: values, and gradients in n as rows.
-struct LobeTerms {
-  Eigen::VectorXd values;
-  Eigen::MatrixX3d gradients;
+// The pixel at N: chi^2 = sum_k w_k r_k^2, J^T W J and J^T W r.
+struct Evaluation {
+  double chi_squared = 0.0;
+  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
 };
 
-void FillTerms(const LobeSamples& samples, const Lobe& lobe, const Eigen::Vector3d& n,
-               LobeTerms& terms) {
-  const Eigen::Index count = samples.l.rows();
-  terms.values.resize(count);
-  terms.gradients.resize(count, 3);
-  for (Eigen::Index k = 0; k < count; ++k) {
-    const LobeTerm term = LobeTermOf(lobe, n, samples.l.row(k).transpose(), samples.v,
-                                     samples.halves[static_cast<size_t>(k)]);
-    terms.values[k] = term.value;
-    terms.gradients.row(k) = term.gradient.transpose();
+Evaluation EvaluateAt(const LobeSamples& samples, const LobeShape& shape,
+                      const Eigen::Vector3d& n) {
+  const double length = n.norm();
+  const Eigen::Vector3d unit = n / length;
+  Evaluation sums;
+  for (Eigen::Index k = 0; k < samples.l.rows(); ++k) {
+    const Eigen::Vector3d l = samples.l.row(k).transpose();
+    const LobeTerm s = shape.At(unit, l, samples.v, samples.halves[static_cast<size_t>(k)]);
+    // Of s(N / |N|) by N: what of the gradient is across N, over |N|.
+    const Eigen::Vector3d j = l + (s.gradient - s.gradient.dot(unit) * unit) / length;
+    const double r = samples.i(k, 3) - l.dot(n) - s.value;
+    const double w = samples.weights[k];
+    sums.chi_squared += w * r * r;
+    sums.information.noalias() += w * j * j.transpose();
+    sums.gradient += w * r * j;
   }
+  return sums;
+}
+
+// (13) under each light.
+Eigen::VectorXd TermsAt(const LobeSamples& samples, const LobeShape& shape,
+                        const Eigen::Vector3d& unit) {
+  Eigen::VectorXd s(samples.l.rows());
+  for (Eigen::Index k = 0; k < samples.l.rows(); ++k) {
+    s[k] = shape.At(unit, samples.l.row(k).transpose(), samples.v,
+                    samples.halves[static_cast<size_t>(k)])
+               .value;
+  }
+  return s;
 }
 
 // 1 / variance of the luminance, (1) of its samples at what least squares N^0 predict.
@@ -132,64 +155,45 @@ Score ScoreOf(const Lobe& lobe, const std::vector<LobeSamples>& pixels, size_t s
   return score;
 }
 
-// N where Gauss-Newton ends, its misfit, and what the lobe is there.
+// N where Gauss-Newton ends, and what the pixel is there.
 struct LobeFit {
   Eigen::Vector3d n = Eigen::Vector3d::Zero();  // zero: no answer
-  double chi_squared = std::numeric_limits<double>::infinity();
-  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();  // J^T W J
-  LobeTerms terms;
+  Evaluation at{.chi_squared = std::numeric_limits<double>::infinity()};
+  const LobeShape* shape = nullptr;
 };
 
-double ChiSquaredAt(const LobeSamples& samples, const Lobe& lobe, const Eigen::Vector3d& n,
-                    LobeTerms& terms) {
-  FillTerms(samples, lobe, n.normalized(), terms);
-  const Eigen::VectorXd r = samples.i.col(3) - samples.l * n - terms.values;
-  return r.dot(samples.weights.cwiseProduct(r));
-}
-
 // (14)
-LobeFit FitFrom(const Eigen::Vector3d& start, const LobeSamples& samples, const Lobe& lobe) {
-  LobeFit fit;
+LobeFit FitFrom(const Eigen::Vector3d& start, const LobeSamples& samples, const LobeShape& shape) {
+  LobeFit fit{.shape = &shape};
   if (!start.allFinite() || start.isZero()) {
     return fit;
   }
   fit.n = start;
-  fit.chi_squared = ChiSquaredAt(samples, lobe, fit.n, fit.terms);
-  LobeTerms terms;
+  fit.at = EvaluateAt(samples, shape, start);
   for (int step = 0; step < kLobeSteps; ++step) {
-    const double length = fit.n.norm();
-    const Eigen::Vector3d unit = fit.n / length;
-    const Eigen::Matrix3d turn = (Eigen::Matrix3d::Identity() - unit * unit.transpose()) / length;
-    const Eigen::MatrixX3d j = samples.l + fit.terms.gradients * turn;
-    const Eigen::MatrixX3d weighted = samples.weights.asDiagonal() * j;
-    const Eigen::VectorXd r = samples.i.col(3) - samples.l * fit.n - fit.terms.values;
-    fit.information = j.transpose() * weighted;
-    Eigen::Vector3d move = fit.information.ldlt().solve(weighted.transpose() * r);
-    bool better = false;
+    const double before = fit.at.chi_squared;
+    Eigen::Vector3d move = fit.at.information.ldlt().solve(fit.at.gradient);
     for (int half = 0; half <= kHalvings && move.allFinite(); ++half, move *= 0.5) {
-      const Eigen::Vector3d next = fit.n + move;
-      const double chi_squared = ChiSquaredAt(samples, lobe, next, terms);
-      if (chi_squared < fit.chi_squared) {
-        fit.n = next;
-        fit.chi_squared = chi_squared;
-        std::swap(fit.terms, terms);
-        better = true;
+      const Evaluation next = EvaluateAt(samples, shape, fit.n + move);
+      if (next.chi_squared < before) {
+        fit.n += move;
+        fit.at = next;
         break;
       }
     }
-    if (!better || move.norm() < kLobeConverged * length) {
+    if (!(fit.at.chi_squared < (1.0 - kLobeConverged) * before)) {
       break;
     }
   }
   return fit;
 }
 
-Eigen::Vector3d LeastSquares(const LobeSamples& samples, const Lobe& /*lobe*/) {
+Eigen::Vector3d LeastSquares(const LobeSamples& samples, const LobeShape& /*shape*/) {
   return (samples.l.transpose() * samples.l).ldlt().solve(samples.l.transpose() * samples.i.col(3));
 }
 
 // Least squares of the darker half of the samples, at least four.
-Eigen::Vector3d DarkerHalf(const LobeSamples& samples, const Lobe& /*lobe*/) {
+Eigen::Vector3d DarkerHalf(const LobeSamples& samples, const LobeShape& /*shape*/) {
   std::vector<Eigen::Index> order(static_cast<size_t>(samples.l.rows()));
   std::iota(order.begin(), order.end(), 0);
   std::ranges::stable_sort(order, {}, [&](Eigen::Index k) { return samples.i(k, 3); });
@@ -197,10 +201,6 @@ Eigen::Vector3d DarkerHalf(const LobeSamples& samples, const Lobe& /*lobe*/) {
   const Eigen::MatrixX3d l = samples.l(order, Eigen::all);
   const Eigen::VectorXd i = samples.i(order, 3);
   return (l.transpose() * l).ldlt().solve(l.transpose() * i);
-}
-
-bool Believed(const Score& score) {
-  return static_cast<double>(score.explained) >= kLobeExplains * static_cast<double>(score.count);
 }
 
 // The lobe changed by so many steps of its figures.
@@ -216,29 +216,68 @@ Lobe Moved(const Lobe& lobe, const LobeMove& by, double step) {
   return moved;
 }
 
-// From `best` on a grid to the least sum over all pixels: half way to the neighbours, and so on.
-void Refine(const std::vector<LobeSamples>& pixels, int threads, Lobe& best, Score& least) {
-  least = ScoreOf(best, pixels, 1, threads);
-  double step = 1.0;
-  for (int j = 0; j < kRefinements; ++j, step *= 0.5) {
-    for (bool has_moved = true; has_moved;) {
-      has_moved = false;
-      const Lobe at = best;
-      for (const LobeMove& move : kLobeMoves) {
-        if (at.model != LobeModel::kGgxAnisotropic && (move.along != 0 || move.azimuth != 0)) {
-          continue;
-        }
-        const Lobe lobe = Moved(at, move, step);
-        const Score score = ScoreOf(lobe, pixels, 1, threads);
-        if (score.sum < least.sum) {
-          least = score;
-          best = lobe;
-          has_moved = true;
-        }
+// The lobe of least sum: on a grid over some of the pixels, then half way to its neighbours over all, and so on.
+class LobeSearch {
+ public:
+  LobeSearch(const std::vector<LobeSamples>& pixels, int threads)
+      : pixels_(pixels), threads_(threads) {}
+
+  void Attempt(const Lobe& lobe) { Take(lobe, kCoarseStep); }
+
+  // False where what was attempted since the last call leads to no lobe that is believed.
+  bool Refine() {
+    const Lobe nothing{.alpha = kAlphas.front(), .strength = 0.0};
+    const double coarse = least_.sum;
+    least_.sum = std::numeric_limits<double>::infinity();
+    if (coarse > kCoarseImproves * ScoreOf(nothing, pixels_, kCoarseStep, threads_).sum) {
+      return false;
+    }
+    Take(best_, 1);
+    double step = 1.0;
+    for (int j = 0; j < kRefinements; ++j, step *= 0.5) {
+      while (StepToNeighbours(step)) {
       }
     }
+    const double without = ScoreOf(nothing, pixels_, 1, threads_).sum;
+    return least_.sum < kLobeImproves * without &&
+           static_cast<double>(least_.explained) >=
+               kLobeExplains * static_cast<double>(least_.count);
   }
-}
+
+  [[nodiscard]] Lobe Best() const {
+    Lobe lobe = best_;
+    lobe.azimuth_deg = std::fmod(lobe.azimuth_deg + 360.0, 180.0);
+    return lobe;
+  }
+
+ private:
+  bool Take(const Lobe& lobe, size_t pixel_step) {
+    const Score score = ScoreOf(lobe, pixels_, pixel_step, threads_);
+    if (!(score.sum < least_.sum)) {
+      return false;
+    }
+    least_ = score;
+    best_ = lobe;
+    return true;
+  }
+
+  bool StepToNeighbours(double step) {
+    const Lobe at = best_;
+    const bool is_of_yarns = at.model == LobeModel::kGgxAnisotropic;
+    bool has_moved = false;
+    for (const LobeMove& move : kLobeMoves) {
+      if (is_of_yarns || (move.along == 0 && move.azimuth == 0)) {
+        has_moved |= Take(Moved(at, move, step), 1);
+      }
+    }
+    return has_moved;
+  }
+
+  const std::vector<LobeSamples>& pixels_;
+  int threads_;
+  Lobe best_;
+  Score least_{.sum = std::numeric_limits<double>::infinity()};
+};
 
 bool LeastSquaresExplain(const MisfitSample& sample, const std::array<float, 256>& limit) {
   size_t checked = 0;
@@ -251,28 +290,30 @@ bool LeastSquaresExplain(const MisfitSample& sample, const std::array<float, 256
 }
 
 // The normal that mirrors the brightest lights, with the body that the samples leave to it.
-Eigen::Vector3d MirrorOfBrightest(const LobeSamples& samples, const Lobe& lobe) {
+Eigen::Vector3d MirrorOfBrightest(const LobeSamples& samples, const LobeShape& shape) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   for (Eigen::Index k = 0; k < samples.l.rows(); ++k) {
     const double i = std::max(0.0, samples.i(k, 3));
-    sum += i * i * (samples.l.row(k).transpose() + samples.v).normalized();
+    sum += i * i * samples.halves[static_cast<size_t>(k)].h;
   }
   const Eigen::Vector3d unit = sum.normalized();
-  LobeTerms terms;
-  FillTerms(samples, lobe, unit, terms);
   const Eigen::VectorXd cosines = samples.l * unit;
-  const double body = cosines.dot(samples.i.col(3) - terms.values) / cosines.squaredNorm();
-  return std::max(body, 0.05 * cosines.dot(samples.i.col(3)) / cosines.squaredNorm()) * unit;
+  const double squares = cosines.squaredNorm();
+  const double body = cosines.dot(samples.i.col(3) - TermsAt(samples, shape, unit)) / squares;
+  return std::max(body, kLeastBody * cosines.dot(samples.i.col(3)) / squares) * unit;
 }
 
 // From the first of three starts that ends within the limit, or the best.
-LobeFit FitLobe(const LobeSamples& samples, const Lobe& lobe, double limit) {
+LobeFit FitLobe(const LobeSamples& samples, std::span<const LobeShape> shapes) {
+  const double limit = samples.limit * static_cast<double>(samples.l.rows() - 3);
   LobeFit fit;
   for (const auto& start : {LeastSquares, DarkerHalf, MirrorOfBrightest}) {
-    if (!(fit.chi_squared <= limit)) {
-      LobeFit other = FitFrom(start(samples, lobe), samples, lobe);
-      if (other.chi_squared < fit.chi_squared) {
-        fit = std::move(other);
+    for (const LobeShape& shape : shapes) {
+      if (!(fit.at.chi_squared <= limit)) {
+        const LobeFit other = FitFrom(start(samples, shape), samples, shape);
+        if (other.at.chi_squared < fit.at.chi_squared) {
+          fit = other;
+        }
       }
     }
   }
@@ -309,33 +350,29 @@ LobeAnswer SolveLobe(const LobeSamples& samples, const Lobe& lobe) {
   if (l.rows() < kFewestForLobe) {
     return {};
   }
-  const auto freedom = static_cast<double>(l.rows() - 3);
-  LobeFit fit = FitLobe(samples, lobe, samples.limit * freedom);
-  if (lobe.model == LobeModel::kGgxAnisotropic) {
-    Lobe crossed = lobe;
-    crossed.azimuth_deg += 90.0;
-    LobeFit other = FitLobe(samples, crossed, samples.limit * freedom);
-    if (other.chi_squared < fit.chi_squared) {
-      fit = std::move(other);
-    }
-  }
+  Lobe crossed = lobe;
+  crossed.azimuth_deg += 90.0;
+  const std::array<LobeShape, 2> shapes = {LobeShape(lobe), LobeShape(crossed)};
+  const LobeFit fit = FitLobe(
+      samples, std::span(shapes).first(lobe.model == LobeModel::kGgxAnisotropic ? 2 : 1));
   LobeAnswer answer;
   const double length = fit.n.norm();
-  if (!std::isfinite(fit.chi_squared) || !(length > 0.0)) {
+  if (!std::isfinite(fit.at.chi_squared) || !(length > 0.0)) {
     return answer;
   }
   answer.n = fit.n;
   const Eigen::Vector3d unit = fit.n / length;
+  const Eigen::VectorXd s = TermsAt(samples, *fit.shape, unit);
   const Eigen::VectorXd cosines = l * unit;
   const double squares = cosines.squaredNorm();
   for (Eigen::Index c = 0; c < 3; ++c) {
-    answer.albedo[c] = std::max(0.0, cosines.dot(i.col(c) - fit.terms.values) / squares);
+    answer.albedo[c] = std::max(0.0, cosines.dot(i.col(c) - s) / squares);
   }
-  answer.lobe_share = cosines.dot(fit.terms.values) / squares / length;
-  const Eigen::VectorXd r = i.col(3) - fit.terms.values - l * fit.n;
-  answer.residual = r.norm() / std::sqrt(static_cast<double>(l.rows()));
-  answer.misfit = fit.chi_squared / freedom;
-  const Eigen::Matrix3d covariance = fit.information.inverse();
+  answer.lobe_share = cosines.dot(s) / squares / length;
+  answer.residual =
+      (i.col(3) - s - l * fit.n).norm() / std::sqrt(static_cast<double>(l.rows()));
+  answer.misfit = fit.at.chi_squared / static_cast<double>(l.rows() - 3);
+  const Eigen::Matrix3d covariance = fit.at.information.inverse();
   const double along = unit.dot(covariance * unit);
   answer.uncertainty_deg =
       std::sqrt(std::max(0.0, covariance.trace() - along)) / length * kDegPerRad;
@@ -358,50 +395,30 @@ std::optional<Lobe> SearchLobe(const std::vector<LobeSamples>& pixels, int threa
   if (pixels.empty()) {
     return std::nullopt;
   }
-  Lobe best;
-  Score least{.sum = std::numeric_limits<double>::infinity()};
-  const auto attempt = [&](const Lobe& lobe, size_t step) {
-    const Score score = ScoreOf(lobe, pixels, step, threads);
-    if (score.sum < least.sum) {
-      least = score;
-      best = lobe;
-      return true;
-    }
-    return false;
-  };
+  LobeSearch search(pixels, threads);
   for (const LobeModel model : {LobeModel::kCloth, LobeModel::kGgx}) {
     for (const double alpha : kAlphas) {
       for (const double strength : kStrengths) {
-        attempt({.model = model, .alpha = alpha, .strength = strength}, kCoarseStep);
+        search.Attempt({.model = model, .alpha = alpha, .strength = strength});
       }
     }
   }
-  Refine(pixels, threads, best, least);
-  if (!Believed(least)) {
-    // Yarns: from gloss that is twice as rough across them as along.
-    const Lobe round = best;
-    const Score of_round = least;
-    least.sum = std::numeric_limits<double>::infinity();
+  if (!search.Refine()) {
     for (const double alpha : kYarnAlphas) {
       for (const double ratio : kYarnRatios) {
         for (const double strength : kYarnStrengths) {
           for (const double azimuth_deg : kYarnAzimuthsDeg) {
-            attempt({LobeModel::kGgxAnisotropic, alpha, strength, ratio * alpha, azimuth_deg},
-                    kCoarseStep);
+            search.Attempt(
+                {LobeModel::kGgxAnisotropic, alpha, strength, ratio * alpha, azimuth_deg});
           }
         }
       }
     }
-    Refine(pixels, threads, best, least);
-    if (of_round.sum <= least.sum) {
-      best = round;
-      least = of_round;
+    if (!search.Refine()) {
+      return std::nullopt;
     }
   }
-  const Score without = ScoreOf({.alpha = kAlphas.front(), .strength = 0.0}, pixels, 1, threads);
-  best.azimuth_deg = std::fmod(best.azimuth_deg + 360.0, 180.0);
-  return Believed(least) && least.sum < kLobeImproves * without.sum ? std::optional(best)
-                                                                    : std::nullopt;
+  return search.Best();
 }
 
 std::optional<Lobe> FindLobe(const LightStack& stack, const Rig& rig,

@@ -35,8 +35,21 @@ struct LobeTerm {
   double value = 0.0;
   Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
 };
-[[nodiscard]] LobeTerm LobeTermOf(const Lobe& lobe, const Eigen::Vector3d& n,
-                                  const Eigen::Vector3d& l, const Eigen::Vector3d& v,
-                                  const LobeHalf& half);
+
+// A lobe made ready for many terms.
+class LobeShape {
+ public:
+  explicit LobeShape(const Lobe& lobe);
+
+  [[nodiscard]] LobeTerm At(const Eigen::Vector3d& n, const Eigen::Vector3d& l,
+                            const Eigen::Vector3d& v, const LobeHalf& half) const;
+
+ private:
+  // D of GGX and its gradient.
+  [[nodiscard]] LobeTerm DistributionAt(const Eigen::Vector3d& n, const Eigen::Vector3d& h) const;
+
+  Lobe lobe_;
+  Eigen::Vector3d tangent_;
+};
 
 }  // namespace sateen

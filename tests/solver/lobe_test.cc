@@ -83,7 +83,7 @@ TEST(Lobe, IsThatOfTheReflectanceModelAndItsGradient) {
         const Eigen::Vector3d n = direction(0.5);
         const Eigen::Vector3d l = direction(1.0);
         const Eigen::Vector3d v = direction(0.1);
-        const LobeTerm term = LobeTermOf(lobe, n, l, v, LobeHalfOf(l, v));
+        const LobeTerm term = LobeShape(lobe).At(n, l, v, LobeHalfOf(l, v));
         const double value = ValueByReflectance(lobe, n, l, v);
         ASSERT_NEAR(term.value, value, 1e-9 * value + 1e-12) << Name(model) << " " << alpha;
         if (n.dot(l) < 0.05 || n.dot(v) < 0.05) {
