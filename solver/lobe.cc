@@ -30,8 +30,8 @@ constexpr double kLobeExplains = 0.7;
 constexpr double kLobeImproves = 0.8;
 // On the grid, which may miss its best figures, a tenth.
 constexpr double kCoarseImproves = 0.9;
-// No misfit counts for more than this many limits: outliers are not the lobe's to explain.
-constexpr double kMostOverLimit = 4.0;
+// What a pixel counts for at most.
+constexpr double kMostOfAPixel = 20.0;
 constexpr std::array kAlphas = {0.15, 0.2, 0.3, 0.4, 0.5, 0.65, 0.85};
 constexpr std::array kStrengths = {0.35, 0.7, 1.4, 2.8};
 constexpr std::array kYarnAlphas = {0.2, 0.35, 0.5};
@@ -39,10 +39,11 @@ constexpr std::array kYarnRatios = {0.3, 0.55};
 constexpr std::array kYarnStrengths = {0.7, 1.4};
 constexpr std::array kYarnAzimuthsDeg = {0.0, 22.5, 45.0, 67.5};
 constexpr double kLeastAlpha = 0.1;
-constexpr int kRefinements = 6;
+constexpr int kRefinements = 7;
+constexpr int kCoarseRefinements = 3;  // over as many pixels as on the grid
 constexpr double kAlphaStep = 0.05;
 constexpr double kAzimuthStepDeg = 8.0;
-constexpr size_t kCoarseStep = 4;  // of the pixels, on the grid of roughness and strength
+constexpr size_t kCoarseStep = 4;  // of the pixels, on the grid
 // Steps of the search; roughness and strength also together, because they make up for each other along a
 // narrow valley.
 struct LobeMove {
@@ -126,8 +127,7 @@ Eigen::VectorXd LuminanceWeightsOf(const PixelSystem& system, const StackNoise& 
   return weights;
 }
 
-// Sum over every `step`th of the pixels of the misfits in limits, none more than kMostOverLimit, and how
-// many are explained.
+// (15) over every `step`th of the pixels, and how many are explained.
 struct Score {
   double sum = 0.0;
   size_t explained = 0;
@@ -149,7 +149,7 @@ Score ScoreOf(const Lobe& lobe, const std::vector<LobeSamples>& pixels, size_t s
       });
   SATEEN_CHECK(done.has_value());
   for (const double misfit : misfits) {
-    score.sum += std::min(misfit, kMostOverLimit);
+    score.sum += std::min(std::log1p(misfit), kMostOfAPixel);
     score.explained += misfit <= 1.0 ? 1 : 0;
   }
   return score;
@@ -228,20 +228,21 @@ class LobeSearch {
   bool Refine() {
     const Lobe nothing{.alpha = kAlphas.front(), .strength = 0.0};
     const double coarse = least_.sum;
-    least_.sum = std::numeric_limits<double>::infinity();
     if (coarse > kCoarseImproves * ScoreOf(nothing, pixels_, kCoarseStep, threads_).sum) {
+      least_ = {.sum = std::numeric_limits<double>::infinity()};
       return false;
     }
-    Take(best_, 1);
     double step = 1.0;
     for (int j = 0; j < kRefinements; ++j, step *= 0.5) {
-      while (StepToNeighbours(step)) {
+      const size_t pixel_step = j < kCoarseRefinements ? kCoarseStep : 1;
+      least_ = ScoreOf(best_, pixels_, pixel_step, threads_);
+      while (StepToNeighbours(step, pixel_step)) {
       }
     }
-    const double without = ScoreOf(nothing, pixels_, 1, threads_).sum;
-    return least_.sum < kLobeImproves * without &&
-           static_cast<double>(least_.explained) >=
-               kLobeExplains * static_cast<double>(least_.count);
+    const Score refined = std::exchange(least_, {.sum = std::numeric_limits<double>::infinity()});
+    return refined.sum < kLobeImproves * ScoreOf(nothing, pixels_, 1, threads_).sum &&
+           static_cast<double>(refined.explained) >=
+               kLobeExplains * static_cast<double>(refined.count);
   }
 
   [[nodiscard]] Lobe Best() const {
@@ -261,13 +262,13 @@ class LobeSearch {
     return true;
   }
 
-  bool StepToNeighbours(double step) {
+  bool StepToNeighbours(double step, size_t pixel_step) {
     const Lobe at = best_;
     const bool is_of_yarns = at.model == LobeModel::kGgxAnisotropic;
     bool has_moved = false;
     for (const LobeMove& move : kLobeMoves) {
       if (is_of_yarns || (move.along == 0 && move.azimuth == 0)) {
-        has_moved |= Take(Moved(at, move, step), 1);
+        has_moved |= Take(Moved(at, move, step), pixel_step);
       }
     }
     return has_moved;

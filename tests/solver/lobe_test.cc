@@ -20,6 +20,11 @@ using testing::Render;
 
 constexpr Lobe kFuzz{.model = LobeModel::kCloth, .alpha = 0.55, .strength = 1.3};
 constexpr Lobe kGloss{.model = LobeModel::kGgx, .alpha = 0.25, .strength = 0.8};
+constexpr Lobe kYarns{.model = LobeModel::kGgxAnisotropic,
+                      .alpha = 0.35,
+                      .strength = 1.2,
+                      .alpha_along = 0.14,
+                      .azimuth_deg = 30.0};
 constexpr ImageSize kLobeSize{64, 48};
 constexpr double kElectrons = 400000.0;
 
@@ -27,9 +32,21 @@ constexpr double kElectrons = 400000.0;
 double ValueByReflectance(const Lobe& lobe, const Eigen::Vector3d& n, const Eigen::Vector3d& l,
                           const Eigen::Vector3d& v) {
   const SpecularSpec spec{.f0 = Eigen::Vector3d::Constant(0.04), .alpha = lobe.alpha};
+  const double azimuth = lobe.azimuth_deg * kRadPerDeg;
+  const AnisotropicSpec of_yarns{.f0 = spec.f0,
+                                 .alpha = lobe.alpha,
+                                 .anisotropy = 1.0 - lobe.alpha_along / lobe.alpha,
+                                 .tangent = {std::cos(azimuth), std::sin(azimuth), 0.0}};
   const double f = lobe.model == LobeModel::kCloth ? Cloth(spec).Evaluate(n, l, v)[0]
-                                                   : Ggx(spec).Evaluate(n, l, v)[0];
+                   : lobe.model == LobeModel::kGgx
+                       ? Ggx(spec).Evaluate(n, l, v)[0]
+                       : GgxAnisotropic(of_yarns).Evaluate(n, l, v)[0];
   return lobe.strength * std::numbers::pi * f * std::max(0.0, n.dot(l));
+}
+
+// Over a body of so much of the albedo that the lobe is no smaller than it.
+double BodyUnder(const Lobe& lobe) {
+  return lobe.model == LobeModel::kGgxAnisotropic ? 0.2 : 0.03;
 }
 
 // Adds the lobe of `share` of 100 pixels, and shot noise of `electrons` at full scale 0.1.
@@ -43,16 +60,17 @@ void AddLobe(const Rig& rig, const Lobe& lobe, int share, double electrons,
     const Eigen::Vector3d x_mm = TablePointOfPixel(*rig.camera, column, row).value();
     const Eigen::Vector3d n(rendered.normal[0].pixels[p], rendered.normal[1].pixels[p],
                             rendered.normal[2].pixels[p]);
+    Lobe of_pixel = lobe;
+    of_pixel.azimuth_deg += column / 8 % 2 == 0 ? 0.0 : 90.0;  // warp and weft
     for (size_t k = 0; k < rig.lights.size(); ++k) {
       const Incident incident = IncidentAt(rig.lights[k], x_mm);
       const double s = static_cast<int>(p % 100) < share
-                           ? ValueByReflectance(lobe, n, incident.l, v)
+                           ? ValueByReflectance(of_pixel, n, incident.l, v)
                            : 0.0;
       for (size_t c = 0; c < 3; ++c) {
         float& i = rendered.stack[k].rgb[c].pixels[p];
-        // A body of a thirtieth of the albedo, so that the lobe is no smaller than it.
         const double clean =
-            0.03 * static_cast<double>(i) + s * incident.e_rgb[static_cast<Eigen::Index>(c)];
+            BodyUnder(lobe) * static_cast<double>(i) + s * incident.e_rgb[static_cast<Eigen::Index>(c)];
         std::poisson_distribution<int> count(clean * electrons / 0.1);
         i = static_cast<float>(count(random) * 0.1 / electrons);
       }
@@ -76,9 +94,14 @@ TEST(Lobe, IsThatOfTheReflectanceModelAndItsGradient) {
   const auto direction = [&](double spread) {
     return Eigen::Vector3d(spread * deviate(random), spread * deviate(random), 1.0).normalized();
   };
-  for (const LobeModel model : {LobeModel::kCloth, LobeModel::kGgx}) {
+  for (const LobeModel model :
+       {LobeModel::kCloth, LobeModel::kGgx, LobeModel::kGgxAnisotropic}) {
     for (const double alpha : {0.1, 0.3, 0.7, 1.0}) {
-      const Lobe lobe{.model = model, .alpha = alpha, .strength = 1.7};
+      const Lobe lobe{.model = model,
+                      .alpha = alpha,
+                      .strength = 1.7,
+                      .alpha_along = 0.45 * alpha,
+                      .azimuth_deg = 65.0};
       for (int draw = 0; draw < 100; ++draw) {
         const Eigen::Vector3d n = direction(0.5);
         const Eigen::Vector3d l = direction(1.0);
@@ -107,12 +130,12 @@ TEST(Lobe, IsThatOfTheReflectanceModelAndItsGradient) {
 
 TEST(Lobe, IsFoundAndTakenOutOfNormalAndAlbedo) {
   const Rig rig = RingRig(kLobeSize);
-  for (const Lobe& lobe : {kFuzz, kGloss}) {
+  for (const Lobe& lobe : {kFuzz, kGloss, kYarns}) {
     RenderedRelief rendered = Render(rig, kLobeSize, 20.0);
     AddLobe(rig, lobe, 100, kElectrons, rendered);
     for (Image<float>& plane : rendered.albedo.planes) {
       for (float& rho : plane.pixels) {
-        rho *= 0.03F;
+        rho *= static_cast<float>(BodyUnder(lobe));
       }
     }
     const LadderOptions options = WithShotNoise(kElectrons, rig.lights.size());
@@ -121,6 +144,10 @@ TEST(Lobe, IsFoundAndTakenOutOfNormalAndAlbedo) {
     EXPECT_EQ(field.summary.lobe->model, lobe.model);
     EXPECT_NEAR(field.summary.lobe->alpha, lobe.alpha, 0.03);
     EXPECT_NEAR(field.summary.lobe->strength, lobe.strength, 0.15);
+    if (lobe.model == LobeModel::kGgxAnisotropic) {
+      EXPECT_NEAR(field.summary.lobe->alpha_along, lobe.alpha_along, 0.03);
+      EXPECT_NEAR(std::fmod(field.summary.lobe->azimuth_deg, 90.0), lobe.azimuth_deg, 3.0);
+    }
     EXPECT_GT(field.summary.under_lobe.pixels, 3072 * 9 / 10);
     LadderOptions plain = options;
     plain.mode = LadderMode::kLeastSquares;
