@@ -15,7 +15,7 @@ LIGHTS ?= 14
 IMAGE_14 = sateen-controller.hex
 IMAGE_16 = sateen-controller-16.hex
 SECONDS ?= 60
-SCENES = twill-ring10 knit linen-three-rings satin-ggx black-velvet rib-shadows
+SCENES = twill-ring10 knit linen-three-rings satin-ggx knit-gloss black-velvet rib-shadows
 CTEST = ctest --output-on-failure --no-tests=error -j$(JOBS)
 # Tracked files and new ones that are not ignored.
 OUR_SOURCES = git ls-files -z --cached --others --exclude-standard '*.h' '*.cc' '*.c'

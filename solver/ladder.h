@@ -74,8 +74,8 @@ struct LadderOptions {
 ///     C = (sum_k w_k l_k l_k^T)^-1, S = sum_k w_k r_k^2 / max(1, sum_k w_k - 3)               (11)
 ///     uncertainty = (2 - agreeing / usable) hypot(spread, 0.4 t), t = angle to rung 1's n      (12)
 ///
-/// and of the albedo the same with n.C n in (11), 0.05 instead of 3 degrees, and for t the share by which
-/// the albedo's luminance differs from rung 1's.
+/// and of the albedo the same with n.C n in (11), 3 degrees as 0.05, and for t the share by which the albedo's
+/// luminance differs from rung 1's; and 0.05 over it, because gloss that is rough reaches all samples alike.
 ///
 /// (6): the highlights of white lights on what is not metal are white, and a coloured cloth's
 /// departure from grey has no part in them.
@@ -87,13 +87,15 @@ struct LadderOptions {
 ///
 /// Rung 3, a lobe that the scene has in common, where the rig has a camera, at kAuto:
 ///
-///     i'_k = N . l_k + s_k(n),  s_k = a pi f(n, l_k, v) max(0, n . l_k), f = Cloth of
-///     reflectance/specular.h with F0 = 0.04, roughness alpha, v towards the camera           (13)
-///     N <- argmin sum_k (i'_k - s_k(n) - N . l_k)^2 / var i'_k, until it moves no more         (14)
-///     a, alpha = argmin sum over some 100 pixels of min(misfit / limit, 4)                   (15)
+///     i'_k = N . l_k + s_k(n),  s_k = a pi f(n, l_k, v) max(0, n . l_k), v towards the camera   (13)
+///     N <- N + (J^T W J)^-1 J^T W r,  r_k = i'_k - s_k - N . l_k,  J_k = l_k + ds_k / dN        (14)
+///     a, alpha = argmin sum over some 400 pixels of log(1 + misfit / limit)                  (15)
 ///
+/// f is Cloth, Ggx or GgxAnisotropic of reflectance/specular.h with F0 = 0.04; of the last, which is
+/// tried where no other does, every pixel takes the better of two tangents at a right angle: warp or weft.
 /// It is looked for where rung 1 explains fewer than 80 of 100 pixels, and believed where (14)
-/// explains 90; then every pixel that it explains takes it, with uncertainty (4) and half a degree.
+/// explains 70; then every pixel that it explains takes it, with the covariance (J^T W J)^-1 in (4), half a
+/// degree, and of the albedo a tenth of what the lobe reflects over it.
 ///
 /// Where all frames are camera RAW, their colours are interpolated, and no rung sees what that does to
 /// the normals where they bend from pixel to pixel:
@@ -104,7 +106,7 @@ struct LadderOptions {
 ///
 /// stack, rig, mask, errors   as SolveLambertian
 /// Cost     rung 1 1.4 times SolveLambertian; rung 2 O(K^2 + K 10^3) a pixel; rung 3 some
-///          microseconds a pixel and 0.1 s to find; the same bits for any number of threads
+///          microseconds a pixel and 0.1 to 1 s to find; the same bits for any number of threads
 /// Source   the search over triples is exhaustive RANSAC (Fischler and Bolles 1981) with the cost of
 ///          sparse regression (log-sum: Candes, Wakin and Boyd 2008); the band is position
 ///          thresholding (Shi et al. 2014, section 3);
