@@ -249,9 +249,8 @@ class AccuracyBench {
       return {};
     }
     const Result<ErrorStatistics> mean = RelativeAlbedoError(field_, *capture.truth->albedo);
-    const Result<Image<float>> error =
-        AlbedoErrorMap(field_, *capture.truth->albedo,
-                       capture.mosaics ? &capture.mosaics->stack.cfa : nullptr);
+    const Result<Image<float>> error = AlbedoErrorMap(
+        field_, *capture.truth->albedo, capture.mosaics ? &capture.mosaics->stack.cfa : nullptr);
     if (!mean || !error) {
       return tl::unexpected(!mean ? mean.error() : error.error());
     }

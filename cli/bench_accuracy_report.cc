@@ -159,8 +159,10 @@ std::string TextReport(const AccuracyReport& report) {
     text += fmt::format("skipped: {}\n", skipped);
   }
   text += fmt::format(
-      "Mpx/s on {} threads ({}); stand.: root mean square of error over predicted uncertainty, of normals and "
-      "of albedo; in 95 %: errors inside the interval that should hold 95 of 100; albedo %: mean relative "
+      "Mpx/s on {} threads ({}); stand.: root mean square of error over predicted uncertainty, of "
+      "normals and "
+      "of albedo; in 95 %: errors inside the interval that should hold 95 of 100; albedo %: mean "
+      "relative "
       "error of its colours\n",
       report.threads, report.instruction_set);
   return text;
@@ -180,7 +182,8 @@ std::string MarkdownReport(const AccuracyReport& report, const std::string& plot
       "that should hold 95 of\n"
       "100; \"albedo %\" the mean relative error of its colours, and after it the same two of the "
       "albedo's uncertainty, which\n"
-      "is that of its luminance, from mosaics of a site's own colour. *LDLT a pixel*, *Huber*, *L1*, *sparse Bayesian* (Ikehata et al. 2012) and *bdcSvd* "
+      "is that of its luminance, from mosaics of a site's own colour. *LDLT a pixel*, *Huber*, "
+      "*L1*, *sparse Bayesian* (Ikehata et al. 2012) and *bdcSvd* "
       "are plain\n"
       "re-implementations from the papers, in double and on one thread; the first four see the "
       "same usable samples as\n"

@@ -122,9 +122,9 @@ Status MapsWriter::Add(const NormalField& band, const Image<float>* angular_erro
 
 Status MapsWriter::Finish(const Image3& first_frame, OutputFolder& folder) {
   Status status;
-  for (std::optional<BandWriter>* file : {&normal_, &normal_png_, &albedo_, &residual_, &samples_,
-                                          &reason_, &uncertainty_, &albedo_uncertainty_, &model_,
-                                          &error_}) {
+  for (std::optional<BandWriter>* file :
+       {&normal_, &normal_png_, &albedo_, &residual_, &samples_, &reason_, &uncertainty_,
+        &albedo_uncertainty_, &model_, &error_}) {
     if (status && *file) {
       status = (*file)->Close();
     }

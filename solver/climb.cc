@@ -150,7 +150,7 @@ void ClimbPixels(const Climb& climb, const ListedPixels& listed, NormalField& fi
 
 // Rung 3 for those of `count` pixels that the scene's lobe explains, also where rung 1 does so by chance.
 void SolveUnderLobe(const Climb& climb, size_t first, size_t count, NormalField& field,
-                     PieceSummary& summary) {
+                    PieceSummary& summary) {
   PixelSystem system(climb.stack, climb.rig, climb.options.least_squares);
   const auto width = static_cast<size_t>(field.reason.width);
   const double noise_scale = std::sqrt(climb.scale_squared);
@@ -197,8 +197,7 @@ void SolvePiece(const Climb& climb, int begin, int end, NormalField& field, Piec
     climb.light_doubt->AddToRow(row, field.reason.Index(0, row), field);
   }
   if (climb.lobe) {
-    summary.lobe_seconds +=
-        SecondsOf([&] { SolveUnderLobe(climb, first, count, field, summary); });
+    summary.lobe_seconds += SecondsOf([&] { SolveUnderLobe(climb, first, count, field, summary); });
   }
   summary.unchecked += CountOf(static_cast<uint8_t>(Rung::kUnchecked),
                                std::span(field.model.pixels).subspan(first, count));

@@ -6,8 +6,8 @@
 #include "solver/ladder.h"
 #include "solver/least_squares.h"
 #include "solver/light_doubt.h"
-#include "solver/rungs.h"
 #include "solver/lobe.h"
+#include "solver/rungs.h"
 
 namespace sateen {
 

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "core/angle.h"
-#include "imaging/color.h"
 #include "core/check.h"
+#include "imaging/color.h"
 
 namespace sateen {
 namespace {
@@ -171,8 +171,8 @@ Result<Image<float>> AlbedoErrorMap(const NormalField& field, const Image3& true
                        : Eigen::Vector3d::Unit((*cfa)[p / width % 2 * 2 + p % width % 2]);
     const double truth = weights.dot(VectorAt(true_albedo, p));
     if (IsSolved(field, p) && truth > 0.0) {
-      map.pixels[p] = static_cast<float>(
-          std::abs(weights.dot(VectorAt(field.albedo, p)) - truth) / truth);
+      map.pixels[p] =
+          static_cast<float>(std::abs(weights.dot(VectorAt(field.albedo, p)) - truth) / truth);
     }
   }
   return map;

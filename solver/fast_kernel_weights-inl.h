@@ -67,7 +67,8 @@ HWY_INLINE StartEquations AccumulateStart(const KernelParams& params, const floa
     AddSquare(l, eq.a);
     AddScaled(l, KeptOf<kAllUsable>(usable, luminance), eq.b);
     for (size_t c = 0; c < 3; ++c) {
-      eq.sum[c] = hn::Add(eq.sum[c], KeptOf<kAllUsable>(usable, hn::Load(d, slot + (3 + c) * lanes)));
+      eq.sum[c] =
+          hn::Add(eq.sum[c], KeptOf<kAllUsable>(usable, hn::Load(d, slot + (3 + c) * lanes)));
     }
     if constexpr (!kAllUsable) {
       eq.count = hn::Add(eq.count, hn::IfThenElseZero(usable, hn::Set(d, 1.0F)));
@@ -265,10 +266,9 @@ HWY_INLINE Weighted SolveWeighted(const KernelParams& params, float* scratch, V 
   const V zero = hn::Zero(d);
   const StartEquations start = AccumulateStart<kDistant, kAllUsable>(params, scratch, threshold);
   Weighted weighted;
-  const V luminance = hn::MulAdd(
-      hn::Set(d, kLuminance[0]), start.sum[0],
-      hn::MulAdd(hn::Set(d, kLuminance[1]), start.sum[1],
-                 hn::Mul(hn::Set(d, kLuminance[2]), start.sum[2])));
+  const V luminance = hn::MulAdd(hn::Set(d, kLuminance[0]), start.sum[0],
+                                 hn::MulAdd(hn::Set(d, kLuminance[1]), start.sum[1],
+                                            hn::Mul(hn::Set(d, kLuminance[2]), start.sum[2])));
   const V inverse_luminance = ReciprocalOf(hn::Max(luminance, hn::Set(d, 1e-37F)));
   for (size_t c = 0; c < 3; ++c) {
     weighted.colour[c] = hn::Mul(hn::Max(start.sum[c], zero), inverse_luminance);  // (2)
@@ -289,7 +289,7 @@ HWY_INLINE Weighted SolveWeighted(const KernelParams& params, float* scratch, V 
       hn::Gt(freedom, zero),
       hn::Mul(chi_squared, hn::Mul(ReciprocalOfPower(units.reference),
                                    RoughReciprocalOf(hn::Max(freedom, hn::Set(d, 1.0F))))));  // (5)
-  const Variances variances = VariancesOf(inverse.a, weighted.n);  // (4)
+  const Variances variances = VariancesOf(inverse.a, weighted.n);                             // (4)
   weighted.uncertainty_deg = hn::Mul(RoughRootOf(hn::Mul(variances.angular, units.reference)),
                                      hn::Set(d, kDegreesPerRadian));
   const V known = hn::Max(Dot(weighted.n, Times(sums.a, weighted.n)), hn::Set(d, 1e-37F));

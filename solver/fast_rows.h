@@ -67,8 +67,8 @@ class FastRows {
 
   FastRows(const LightStack& stack, const std::optional<Mask>& mask)
       : stack_(&stack), mask_(&mask) {}
-  void Run(SpanFunction function, int begin, int end, const PixelGeometry& geometry, NormalField& field,
-           float* misfits, double noise_scale = 1.0) const;
+  void Run(SpanFunction function, int begin, int end, const PixelGeometry& geometry,
+           NormalField& field, float* misfits, double noise_scale = 1.0) const;
   // Runs `function` over listed pixels.
   void RunListed(SpanFunction function, const ListedPixels& listed, bool has_positions,
                  const KernelOutput& output) const;

@@ -13,6 +13,7 @@
 #include "solver/climb.h"
 #include "solver/consensus.h"
 #include "solver/least_squares.h"
+#include "solver/lobe_search.h"
 #include "solver/noise_scale.h"
 
 namespace sateen {
@@ -80,9 +81,7 @@ Status DoubtInterpolation(const Task& task, NormalField& field, PieceSummary& to
     return Eigen::Vector3f(field.normal[0].pixels[p], field.normal[1].pixels[p],
                            field.normal[2].pixels[p]);
   };
-  const auto albedo_at = [&](size_t p) {
-    return Eigen::Matrix<float, 1, 1>(AlbedoAt(field, p));
-  };
+  const auto albedo_at = [&](size_t p) { return Eigen::Matrix<float, 1, 1>(AlbedoAt(field, p)); };
   Status status = ParallelFor(size.height, RowsPerPiece(size), silent, [&](int begin, int end) {
     for (int row = begin; row < end; ++row) {
       PieceSummary& sums = rows[static_cast<size_t>(row)];
@@ -106,7 +105,7 @@ Status DoubtInterpolation(const Task& task, NormalField& field, PieceSummary& to
                         : 1.0F;
         const auto rung = static_cast<Rung>(field.model.pixels[p]);
         double& sum = rung <= Rung::kUnchecked ? sums.least_squares_deg
-                      : rung == Rung::kLobe   ? sums.lobe_deg
+                      : rung == Rung::kLobe    ? sums.lobe_deg
                                                : sums.robust_deg;
         sum += static_cast<double>(uncertainty);
       }

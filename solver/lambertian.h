@@ -62,7 +62,7 @@ enum class Rung : uint8_t {
   kLeastSquares = 64,  // weighted least squares explain the samples
   kUnchecked = 96,     // the same with three samples, so that no residual is left to tell
   kConsensus = 128,    // samples that agree, against others that do not
-  kLobe = 192,        // a Lambertian body under a lobe that the scene has in common
+  kLobe = 192,         // a Lambertian body under a lobe that the scene has in common
   kUnexplained = 255   // fewer than four samples agree: do not trust
 };
 
@@ -104,9 +104,10 @@ struct NormalField {
   Image<uint8_t> samples;  // usable samples, 255 = 255 or more
   Image<uint8_t> reason;   // of type Reason
   // SolveLadder alone; SolveLambertian leaves them empty.
-  Image<float> uncertainty;         // degrees, one standard deviation of the normal's angle
-  Image<float> albedo_uncertainty;  // standard deviation of the albedo's luminance over itself, at most 1
-  Image<uint8_t> model;      // of type Rung
+  Image<float> uncertainty;  // degrees, one standard deviation of the normal's angle
+  Image<float>
+      albedo_uncertainty;  // standard deviation of the albedo's luminance over itself, at most 1
+  Image<uint8_t> model;    // of type Rung
   SolveSummary summary;
 
   // Reallocates where the size differs; the content is not defined until a solve.

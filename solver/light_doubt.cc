@@ -67,8 +67,8 @@ Forms FormsAt(const Lights& lights, const Eigen::Vector3d& x_mm) {
     const LightErrors errors = ErrorsOf(lights[k], x_mm);
     const auto column = static_cast<Eigen::Index>(k);
     const Eigen::Vector3d l = directions.row(column).transpose();
-    const Vector6d variance =
-        errors.direction * one + (errors.irradiance - errors.direction) * PackedOf(l * l.transpose());
+    const Vector6d variance = errors.direction * one +
+                              (errors.irradiance - errors.direction) * PackedOf(l * l.transpose());
     const Vector6d along = PackedOf(g.col(column) * g.col(column).transpose());
     forms.along += along * variance.transpose();
     forms.across += (g.col(column).squaredNorm() * one - along) * variance.transpose();

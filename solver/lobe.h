@@ -1,11 +1,9 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <array>
 #include <optional>
 #include <vector>
 
-#include "solver/least_squares.h"
 #include "solver/lobe_term.h"
 #include "solver/noise.h"
 #include "solver/pixel_system.h"
@@ -50,23 +48,8 @@ struct LobeSamples {
 /// Cost   3 to 6 microseconds of ten samples, of yarns twice that
 [[nodiscard]] LobeAnswer SolveLobe(const LobeSamples& samples, const Lobe& lobe);
 
-// Equation (15) over these pixels; nothing where no lobe explains 70 of 100, or where it is little
-// better than none.
-[[nodiscard]] std::optional<Lobe> SearchLobe(const std::vector<LobeSamples>& pixels, int threads);
-
-// Pixels that SearchLobe() is to be given, fewer samples that leave too little to tell body from lobe,
-// and the share of pixels that rung 1 has to explain so that no lobe is looked for.
-inline constexpr size_t kLobePixels = 384;
+// Fewer samples leave too little to tell body from lobe: no answer.
 inline constexpr int kFewestForLobe = 6;
-inline constexpr double kWellExplained = 0.8;
-
-// The lobe that explains a sample of pixels of which plain least squares leave many unexplained;
-// nothing where none does, or where there is no camera to say from where the surface is seen. A pixel
-// is explained where its misfit is at most limit[its usable samples].
-[[nodiscard]] std::optional<Lobe> FindLobe(const LightStack& stack, const Rig& rig,
-                                           const LambertianOptions& options,
-                                           const StackNoise& noise, const MisfitSample& sample,
-                                           const std::array<float, 256>& limit, int threads);
 
 // From the table point that pixel (column, row) sees to the camera; nothing without a pose.
 [[nodiscard]] std::optional<Eigen::Vector3d> ViewOf(const Rig& rig, int column, int row);

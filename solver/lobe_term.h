@@ -20,7 +20,8 @@ struct Lobe {
   double alpha = 0.0;        // roughness; of yarns, across their fibres
   double strength = 0.0;     // times the model with F0 = 0.04
   double alpha_along = 0.0;  // kGgxAnisotropic: along their fibres
-  double azimuth_deg = 0.0;  // ... and from x to where `alpha` counts, on the table; warp or weft, [0, 180)
+  double azimuth_deg =
+      0.0;  // ... and from x to where `alpha` counts, on the table; warp or weft, [0, 180)
 };
 
 // Half vector of l and v, and Schlick's share of a dielectric of F0 = 0.04 there: what does not depend on n.

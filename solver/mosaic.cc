@@ -11,12 +11,13 @@
 
 #include "core/parallel.h"
 #include "solver/fast_rows.h"
+#include "solver/lobe.h"
+#include "solver/lobe_search.h"
 #include "solver/mosaic_feed.h"
 #include "solver/mosaic_noise.h"
 #include "solver/mosaic_rungs.h"
 #include "solver/mosaic_site.h"
 #include "solver/rungs.h"
-#include "solver/lobe.h"
 
 namespace sateen {
 namespace {

@@ -71,7 +71,7 @@ bool MustClimb(const MosaicJob& job, SiteRows& rows, size_t p) {
 
 // Rung 3: for those sites that the scene's lobe explains.
 void SolveSitesUnderLobe(const MosaicJob& job, const MosaicPiece& piece, SiteRows& rows,
-                          PieceSummary& summary) {
+                         PieceSummary& summary) {
   MosaicSite site(job.stack, job.rig, job.options.least_squares, true);
   NormalField& field = rows.Field();
   for (int row = piece.Begin(); row < piece.End(); ++row) {

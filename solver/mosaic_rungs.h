@@ -6,10 +6,10 @@
 #include "imaging/mosaic_stack.h"
 #include "rig/rig.h"
 #include "solver/light_doubt.h"
+#include "solver/lobe.h"
 #include "solver/mosaic.h"
 #include "solver/mosaic_feed.h"
 #include "solver/rungs.h"
-#include "solver/lobe.h"
 
 namespace sateen {
 

@@ -162,8 +162,9 @@ std::optional<LobeSamples> MosaicSite::LobeSamplesAt(int column, int row, const 
     weights[k] = WeightOf(k, static_cast<size_t>(row % 2 * 2 + column % 2), n);
   }
   // As the maps count samples: 255 stands for more.
-  return LobeSamples(l, i.replicate<1, 4>(), weights, v,
-                     static_cast<double>(limit[static_cast<size_t>(std::min(solution.samples, 255))]));
+  return LobeSamples(
+      l, i.replicate<1, 4>(), weights, v,
+      static_cast<double>(limit[static_cast<size_t>(std::min(solution.samples, 255))]));
 }
 
 void MosaicSite::Weigh(size_t site, SiteSolution& solution) const {

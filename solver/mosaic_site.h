@@ -8,8 +8,8 @@
 #include "imaging/mosaic_stack.h"
 #include "rig/rig.h"
 #include "solver/lambertian.h"
-#include "solver/mosaic_feed.h"
 #include "solver/lobe.h"
+#include "solver/mosaic_feed.h"
 
 namespace sateen {
 

@@ -219,13 +219,14 @@ PlainAnswer PlainWeighted(const PixelSystem& system, const StackNoise& noise) {
   if (!step.allFinite()) {
     return answer;
   }
-  answer.n = n + step;                                                                       // (4)
+  answer.n = n + step;  // (4)
   answer.albedo = b * answer.n.norm();
   const PlainVariances of_n = VariancesOf(covariance, answer.n);  // (4)
   answer.uncertainty_deg = std::sqrt(of_n.angular) * kDegPerRad;
-  const double of_luminance = (LuminanceWeights().array().square() * v).sum() / (u.square() * v).sum();
-  answer.albedo_uncertainty = std::sqrt(
-      std::max(0.0, of_n.albedo + (of_luminance - 1.0) / answer.n.dot(a * answer.n)));
+  const double of_luminance =
+      (LuminanceWeights().array().square() * v).sum() / (u.square() * v).sum();
+  answer.albedo_uncertainty =
+      std::sqrt(std::max(0.0, of_n.albedo + (of_luminance - 1.0) / answer.n.dot(a * answer.n)));
   if (system.Count() > 3) {
     answer.misfit = std::max(0.0, chi_squared - gradient.dot(step)) / (system.Count() - 3);  // (5)
   }

@@ -74,12 +74,13 @@ void JudgeConsensus(std::span<const size_t> pixels, std::span<const Estimate> be
                      : 1.0;
     const double rejected = 1.0 - static_cast<double>(agreeing[j]) /
                                       static_cast<double>(field.samples.pixels[pixels[j]]);
-    const double factor = (1.0 + std::max(0.0, rejected)) * (is_explained ? 1.0 : kUnexplainedFactor);
+    const double factor =
+        (1.0 + std::max(0.0, rejected)) * (is_explained ? 1.0 : kUnexplainedFactor);
     const double of_gloss = albedo > 0.0 ? kGlossInAlbedo / albedo : 1.0;
     const auto doubt = [&](float of_spread, double difference) {
-      return static_cast<float>(
-          factor * std::hypot(static_cast<double>(of_spread),
-                              static_cast<double>(kUncertaintyOfTurn) * difference));
+      return static_cast<float>(factor *
+                                std::hypot(static_cast<double>(of_spread),
+                                           static_cast<double>(kUncertaintyOfTurn) * difference));
     };
     float& uncertainty = field.uncertainty.pixels[pixels[j]];
     uncertainty = std::min(180.0F, doubt(uncertainty, turned_deg));
@@ -120,7 +121,7 @@ Doubt DoubtOf(const PieceSummary& total) {
 }
 
 void StoreLobeUncertainty(const LobeAnswer& answer, double noise_scale, NormalField& field,
-                           size_t pixel) {
+                          size_t pixel) {
   field.uncertainty.pixels[pixel] = static_cast<float>(std::min(
       180.0, std::hypot(answer.uncertainty_deg * noise_scale, kLobeUncertainty * kDegPerRad)));
   field.albedo_uncertainty.pixels[pixel] = static_cast<float>(
@@ -141,7 +142,7 @@ void ReportRungs(const PieceSummary& total, SolveSummary& summary) {
   summary.robust = {total.robust, total.climbing_seconds / std::max(1, summary.threads),
                     mean(total.robust_deg, total.robust)};
   summary.under_lobe = {total.lobe, total.lobe_seconds / std::max(1, summary.threads),
-                   mean(total.lobe_deg, total.lobe)};
+                        mean(total.lobe_deg, total.lobe)};
   summary.least_squares = {
       total.least_squares + total.unchecked,
       std::max(0.0, summary.seconds - summary.robust.seconds - summary.under_lobe.seconds),

@@ -76,7 +76,7 @@ struct Doubt {
 // Of a pixel under a lobe: what noise does, `noise_scale` times what the answer says, and what a cloth
 // differs by from the lobe it is given.
 void StoreLobeUncertainty(const LobeAnswer& answer, double noise_scale, NormalField& field,
-                           size_t pixel);
+                          size_t pixel);
 
 [[nodiscard]] double SecondsOf(const std::function<void()>& work);
 

@@ -38,16 +38,13 @@ double ValueByReflectance(const Lobe& lobe, const Eigen::Vector3d& n, const Eige
                                  .anisotropy = 1.0 - lobe.alpha_along / lobe.alpha,
                                  .tangent = {std::cos(azimuth), std::sin(azimuth), 0.0}};
   const double f = lobe.model == LobeModel::kCloth ? Cloth(spec).Evaluate(n, l, v)[0]
-                   : lobe.model == LobeModel::kGgx
-                       ? Ggx(spec).Evaluate(n, l, v)[0]
-                       : GgxAnisotropic(of_yarns).Evaluate(n, l, v)[0];
+                   : lobe.model == LobeModel::kGgx ? Ggx(spec).Evaluate(n, l, v)[0]
+                                                   : GgxAnisotropic(of_yarns).Evaluate(n, l, v)[0];
   return lobe.strength * std::numbers::pi * f * std::max(0.0, n.dot(l));
 }
 
 // Over a body of so much of the albedo that the lobe is no smaller than it.
-double BodyUnder(const Lobe& lobe) {
-  return lobe.model == LobeModel::kGgxAnisotropic ? 0.2 : 0.03;
-}
+double BodyUnder(const Lobe& lobe) { return lobe.model == LobeModel::kGgxAnisotropic ? 0.2 : 0.03; }
 
 // Adds the lobe of `share` of 100 pixels, and shot noise of `electrons` at full scale 0.1.
 void AddLobe(const Rig& rig, const Lobe& lobe, int share, double electrons,
@@ -64,13 +61,12 @@ void AddLobe(const Rig& rig, const Lobe& lobe, int share, double electrons,
     of_pixel.azimuth_deg += column / 8 % 2 == 0 ? 0.0 : 90.0;  // warp and weft
     for (size_t k = 0; k < rig.lights.size(); ++k) {
       const Incident incident = IncidentAt(rig.lights[k], x_mm);
-      const double s = static_cast<int>(p % 100) < share
-                           ? ValueByReflectance(of_pixel, n, incident.l, v)
-                           : 0.0;
+      const double s =
+          static_cast<int>(p % 100) < share ? ValueByReflectance(of_pixel, n, incident.l, v) : 0.0;
       for (size_t c = 0; c < 3; ++c) {
         float& i = rendered.stack[k].rgb[c].pixels[p];
-        const double clean =
-            BodyUnder(lobe) * static_cast<double>(i) + s * incident.e_rgb[static_cast<Eigen::Index>(c)];
+        const double clean = BodyUnder(lobe) * static_cast<double>(i) +
+                             s * incident.e_rgb[static_cast<Eigen::Index>(c)];
         std::poisson_distribution<int> count(clean * electrons / 0.1);
         i = static_cast<float>(count(random) * 0.1 / electrons);
       }
@@ -94,8 +90,7 @@ TEST(Lobe, IsThatOfTheReflectanceModelAndItsGradient) {
   const auto direction = [&](double spread) {
     return Eigen::Vector3d(spread * deviate(random), spread * deviate(random), 1.0).normalized();
   };
-  for (const LobeModel model :
-       {LobeModel::kCloth, LobeModel::kGgx, LobeModel::kGgxAnisotropic}) {
+  for (const LobeModel model : {LobeModel::kCloth, LobeModel::kGgx, LobeModel::kGgxAnisotropic}) {
     for (const double alpha : {0.1, 0.3, 0.7, 1.0}) {
       const Lobe lobe{.model = model,
                       .alpha = alpha,

@@ -21,7 +21,8 @@ double StandardisedAlbedoError(const NormalField& field, const RenderedRelief& t
   const Image<float> error = AlbedoErrorMap(field, truth.albedo).value();
   double squares = 0.0;
   for (size_t p = 0; p < error.pixels.size(); ++p) {
-    squares += std::pow(static_cast<double>(error.pixels[p] / field.albedo_uncertainty.pixels[p]), 2);
+    squares +=
+        std::pow(static_cast<double>(error.pixels[p] / field.albedo_uncertainty.pixels[p]), 2);
   }
   return std::sqrt(squares / static_cast<double>(error.pixels.size()));
 }

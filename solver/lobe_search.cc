@@ -1,0 +1,230 @@
+#include "solver/lobe_search.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "core/check.h"
+#include "core/parallel.h"
+
+namespace sateen {
+namespace {
+
+// A lobe is believed where it explains this share of the pixels that it is looked for on.
+constexpr double kLobeExplains = 0.7;
+// ... and takes at least a fifth off their misfits: chance takes a twentieth.
+constexpr double kLobeImproves = 0.8;
+// On the grid, which may miss its best figures, a tenth.
+constexpr double kCoarseImproves = 0.9;
+// What a pixel counts for at most.
+constexpr double kMostOfAPixel = 20.0;
+constexpr std::array kAlphas = {0.15, 0.2, 0.3, 0.4, 0.5, 0.65, 0.85};
+constexpr std::array kStrengths = {0.35, 0.7, 1.4, 2.8};
+constexpr std::array kYarnAlphas = {0.2, 0.35, 0.5};
+constexpr std::array kYarnRatios = {0.3, 0.55};
+constexpr std::array kYarnStrengths = {0.7, 1.4};
+constexpr std::array kYarnAzimuthsDeg = {0.0, 22.5, 45.0, 67.5};
+constexpr double kLeastAlpha = 0.1;
+constexpr int kRefinements = 7;
+constexpr int kCoarseRefinements = 3;  // over as many pixels as on the grid
+constexpr double kAlphaStep = 0.05;
+constexpr double kAzimuthStepDeg = 8.0;
+constexpr size_t kCoarseStep = 4;  // of the pixels, on the grid
+
+// Steps of the search; roughness and strength also together, because they make up for each other along a
+// narrow valley.
+struct LobeMove {
+  int alpha = 0;
+  int strength = 0;
+  int along = 0;
+  int azimuth = 0;
+};
+constexpr std::array<LobeMove, 14> kLobeMoves = {{{1, 0},
+                                                  {-1, 0},
+                                                  {0, 1},
+                                                  {0, -1},
+                                                  {1, -1},
+                                                  {-1, 1},
+                                                  {1, 1},
+                                                  {-1, -1},
+                                                  {0, 0, 1},
+                                                  {0, 0, -1},
+                                                  {0, 1, 1},
+                                                  {0, -1, -1},
+                                                  {0, 0, 0, 1},
+                                                  {0, 0, 0, -1}}};
+
+// (15) over every `step`th of the pixels, and how many are explained.
+struct Score {
+  double sum = 0.0;
+  size_t explained = 0;
+  size_t count = 0;
+};
+
+Score ScoreOf(const Lobe& lobe, const std::vector<LobeSamples>& pixels, size_t step, int threads) {
+  Score score;
+  score.count = (pixels.size() + step - 1) / step;
+  std::vector<double> misfits(score.count);
+  const Status done =
+      ParallelFor(static_cast<int>(score.count), 8, {.threads = threads}, [&](int begin, int end) {
+        for (auto j = static_cast<size_t>(begin); j < static_cast<size_t>(end); ++j) {
+          const LobeSamples& pixel = pixels[j * step];
+          const LobeAnswer answer = SolveLobe(pixel, lobe);
+          misfits[j] = answer.n.isZero() ? std::numeric_limits<double>::infinity()
+                                         : answer.misfit / pixel.limit;
+        }
+      });
+  SATEEN_CHECK(done.has_value());
+  for (const double misfit : misfits) {
+    score.sum += std::min(std::log1p(misfit), kMostOfAPixel);
+    score.explained += misfit <= 1.0 ? 1 : 0;
+  }
+  return score;
+}
+
+// The lobe changed by so many steps of its figures.
+Lobe Moved(const Lobe& lobe, const LobeMove& by, double step) {
+  Lobe moved = lobe;
+  moved.alpha = std::clamp(lobe.alpha + by.alpha * kAlphaStep * step, kLeastAlpha, 1.0);
+  moved.strength = lobe.strength * std::pow(2.0, 0.5 * by.strength * step);
+  if (lobe.model == LobeModel::kGgxAnisotropic) {
+    moved.alpha_along =
+        std::clamp(lobe.alpha_along * std::pow(2.0, 0.5 * by.along * step), kLeastAlpha / 2.0, 1.0);
+    moved.azimuth_deg = lobe.azimuth_deg + by.azimuth * kAzimuthStepDeg * step;
+  }
+  return moved;
+}
+
+// The lobe of least sum: on a grid over some of the pixels, then half way to its neighbours over all, and so on.
+class LobeSearch {
+ public:
+  LobeSearch(const std::vector<LobeSamples>& pixels, int threads)
+      : pixels_(pixels), threads_(threads) {}
+
+  void Attempt(const Lobe& lobe) { Take(lobe, kCoarseStep); }
+
+  // False where what was attempted since the last call leads to no lobe that is believed.
+  bool Refine() {
+    const Lobe nothing{.alpha = kAlphas.front(), .strength = 0.0};
+    const double coarse = least_.sum;
+    if (coarse > kCoarseImproves * ScoreOf(nothing, pixels_, kCoarseStep, threads_).sum) {
+      least_ = {.sum = std::numeric_limits<double>::infinity()};
+      return false;
+    }
+    double step = 1.0;
+    for (int j = 0; j < kRefinements; ++j, step *= 0.5) {
+      const size_t pixel_step = j < kCoarseRefinements ? kCoarseStep : 1;
+      least_ = ScoreOf(best_, pixels_, pixel_step, threads_);
+      while (StepToNeighbours(step, pixel_step)) {
+      }
+    }
+    const Score refined = std::exchange(least_, {.sum = std::numeric_limits<double>::infinity()});
+    return refined.sum < kLobeImproves * ScoreOf(nothing, pixels_, 1, threads_).sum &&
+           static_cast<double>(refined.explained) >=
+               kLobeExplains * static_cast<double>(refined.count);
+  }
+
+  [[nodiscard]] Lobe Best() const {
+    Lobe lobe = best_;
+    lobe.azimuth_deg = std::fmod(lobe.azimuth_deg + 360.0, 180.0);
+    return lobe;
+  }
+
+ private:
+  bool Take(const Lobe& lobe, size_t pixel_step) {
+    const Score score = ScoreOf(lobe, pixels_, pixel_step, threads_);
+    if (!(score.sum < least_.sum)) {
+      return false;
+    }
+    least_ = score;
+    best_ = lobe;
+    return true;
+  }
+
+  bool StepToNeighbours(double step, size_t pixel_step) {
+    const Lobe at = best_;
+    const bool is_of_yarns = at.model == LobeModel::kGgxAnisotropic;
+    bool has_moved = false;
+    for (const LobeMove& move : kLobeMoves) {
+      if (is_of_yarns || (move.along == 0 && move.azimuth == 0)) {
+        has_moved |= Take(Moved(at, move, step), pixel_step);
+      }
+    }
+    return has_moved;
+  }
+
+  const std::vector<LobeSamples>& pixels_;
+  int threads_;
+  Lobe best_;
+  Score least_{.sum = std::numeric_limits<double>::infinity()};
+};
+
+bool LeastSquaresExplain(const MisfitSample& sample, const std::array<float, 256>& limit) {
+  size_t checked = 0;
+  size_t explained = 0;
+  for (size_t j = 0; j < sample.pixels.size(); ++j) {
+    checked += sample.samples[j] > 3 ? 1 : 0;
+    explained += sample.samples[j] > 3 && sample.misfits[j] <= limit[sample.samples[j]] ? 1 : 0;
+  }
+  return static_cast<double>(explained) >= kWellExplained * static_cast<double>(checked);
+}
+
+}  // namespace
+
+std::optional<Lobe> SearchLobe(const std::vector<LobeSamples>& pixels, int threads) {
+  if (pixels.empty()) {
+    return std::nullopt;
+  }
+  LobeSearch search(pixels, threads);
+  for (const LobeModel model : {LobeModel::kCloth, LobeModel::kGgx}) {
+    for (const double alpha : kAlphas) {
+      for (const double strength : kStrengths) {
+        search.Attempt({.model = model, .alpha = alpha, .strength = strength});
+      }
+    }
+  }
+  if (!search.Refine()) {
+    for (const double alpha : kYarnAlphas) {
+      for (const double ratio : kYarnRatios) {
+        for (const double strength : kYarnStrengths) {
+          for (const double azimuth_deg : kYarnAzimuthsDeg) {
+            search.Attempt(
+                {LobeModel::kGgxAnisotropic, alpha, strength, ratio * alpha, azimuth_deg});
+          }
+        }
+      }
+    }
+    if (!search.Refine()) {
+      return std::nullopt;
+    }
+  }
+  return search.Best();
+}
+
+std::optional<Lobe> FindLobe(const LightStack& stack, const Rig& rig,
+                             const LambertianOptions& options, const StackNoise& noise,
+                             const MisfitSample& sample, const std::array<float, 256>& limit,
+                             int threads) {
+  if (LeastSquaresExplain(sample, limit)) {
+    return std::nullopt;
+  }
+  const auto width = static_cast<size_t>(stack[0].rgb[0].width);
+  PixelSystem system(stack, rig, options);
+  std::vector<LobeSamples> pixels;
+  const size_t step = std::max<size_t>(1, sample.pixels.size() / kLobePixels);
+  for (size_t j = 0; j < sample.pixels.size(); j += step) {
+    const auto column = static_cast<int>(sample.pixels[j] % width);
+    const auto row = static_cast<int>(sample.pixels[j] / width);
+    const std::optional<Eigen::Vector3d> v = ViewOf(rig, column, row);
+    if (v && sample.samples[j] >= kFewestForLobe) {
+      system.Gather(column, row);
+      pixels.push_back(
+          LobeSamplesOf(system, noise, *v, static_cast<double>(limit[sample.samples[j]])));
+    }
+  }
+  return SearchLobe(pixels, threads);
+}
+
+}  // namespace sateen
