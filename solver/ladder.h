@@ -81,7 +81,7 @@ struct LadderOptions {
 /// departure from grey has no part in them.
 /// (9) is the sum of logarithms: it prefers a normal that many samples agree with exactly, whatever
 /// the others do, which is what highlights and shadows need. A pixel in which fewer than four
-/// samples agree with N to 0.1 q is kUnexplained; one with three usable samples, which nothing can
+/// samples agree with N to 0.1 q is kUnexplained, three times as uncertain, at least 60 degrees where no N is left; one with three usable samples, which nothing can
 /// check, is kUnchecked. Where from 2 to 20 of 100 pixels take this rung, rung 1's uncertainty gets 0 to
 /// all of hypot(3 degrees, 0.4 t), t in the mean of those pixels; kUnchecked all of t.
 ///

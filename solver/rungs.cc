@@ -15,6 +15,8 @@ namespace sateen {
 namespace {
 
 constexpr double kUnexplainedFactor = 3.0;
+// Where the search has no answer: root mean square angle of the hemisphere's normals to its middle, some 60.
+constexpr float kAnyNormalDeg = 60.0F;
 // Where many pixels climb, the model is wrong in what noise hides in the others, too: fully from this
 // share on, and not at all where false alarms are as many.
 constexpr double kDoubtfulShare = 0.2;
@@ -86,6 +88,10 @@ void JudgeConsensus(std::span<const size_t> pixels, std::span<const Estimate> be
     uncertainty = std::min(180.0F, doubt(uncertainty, turned_deg));
     float& of_albedo = field.albedo_uncertainty.pixels[pixels[j]];
     of_albedo = std::min(1.0F, std::hypot(doubt(of_albedo, change), static_cast<float>(of_gloss)));
+    if (agreeing[j] == 0) {
+      uncertainty = std::max(uncertainty, kAnyNormalDeg);
+      of_albedo = 1.0F;
+    }
     summary.unexplained += is_explained ? 0 : 1;
     field.model.pixels[pixels[j]] =
         static_cast<uint8_t>(is_explained ? Rung::kConsensus : Rung::kUnexplained);

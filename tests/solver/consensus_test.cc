@@ -2,6 +2,7 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <random>
 
@@ -229,6 +230,28 @@ TEST(Consensus, IsNotSureOfItselfWhereTheWrongSamplesAgree) {
   }
   EXPECT_EQ(doubted, 2400U);
   EXPECT_EQ(albedo_doubted, 2400U);
+}
+
+// Two pixels whose search has no answer and one: they keep rung 1's normal, but not its word on it.
+TEST(Consensus, APixelWithoutAnAnswerSaysSo) {
+  NormalField field;
+  field.Resize({2, 1});
+  field.samples.pixels = {7, 7};
+  field.model = Image<uint8_t>(ImageSize{2, 1});
+  field.uncertainty = Image<float>(ImageSize{2, 1}, 0.05F);
+  field.albedo_uncertainty = Image<float>(ImageSize{2, 1}, 0.001F);
+  const std::vector<Estimate> same(2, Estimate{Eigen::Vector3f::UnitZ(), 1.0F});
+  const std::array<size_t, 2> pixels = {0, 1};
+  const std::array<uint8_t, 2> agreeing = {0, 3};
+  PieceSummary summary;
+  JudgeConsensus(pixels, same, same, agreeing, field, summary);
+  EXPECT_GE(field.uncertainty.pixels[0], 60.0F);
+  EXPECT_EQ(field.albedo_uncertainty.pixels[0], 1.0F);
+  // (2 - 3 / 7) times three; of the albedo 0.05 for gloss.
+  EXPECT_NEAR(field.uncertainty.pixels[1], 0.05 * 11.0 / 7.0 * 3.0, 1e-5);
+  EXPECT_NEAR(field.albedo_uncertainty.pixels[1], std::hypot(0.001 * 33.0 / 7.0, 0.05), 1e-5);
+  EXPECT_EQ(field.model.pixels[0], static_cast<uint8_t>(Rung::kUnexplained));
+  EXPECT_EQ(summary.unexplained, 2);
 }
 
 TEST(Consensus, RungOneIsDoubtedAsMuchAsPixelsClimb) {
