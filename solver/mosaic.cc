@@ -41,7 +41,8 @@ void ResizeMaps(ImageSize size, bool with_ladder, NormalField& field) {
   }
 }
 
-Status CheckMosaics(const MosaicStack& stack, const Rig& rig, const std::optional<Mask>& mask) {
+Status CheckMosaics(const MosaicStack& stack, const Rig& rig, const std::optional<Mask>& mask,
+                    const LambertianOptions& options) {
   const ImageSize size = stack.size_px;
   if (stack.lit.size() != rig.lights.size()) {
     return Fail(ErrorCode::kBadData, "{} frames but {} lights; need one light a frame",
@@ -59,7 +60,9 @@ Status CheckMosaics(const MosaicStack& stack, const Rig& rig, const std::optiona
     return Fail(ErrorCode::kBadData, "the mask is {}x{} px but the frames are {}x{} px",
                 mask->width, mask->height, size.width, size.height);
   }
-  if (Status status = rig.Validate("rig"); !status || AllDistant(rig.lights)) {
+  if (Status status = rig.Validate("rig").and_then(
+          [&] { return CheckHeight(options.height_mm, rig, size); });
+      !status || AllDistant(rig.lights)) {
     return status;
   }
   if (rig.camera->size_px != size) {
@@ -268,7 +271,7 @@ Result<SolveSummary> SolveBandsBy(const MosaicStack& stack, const Rig& rig,
                                   const std::function<Status(BandSolver&)>& solve_bands) {
   const Clock::time_point start = Clock::now();
   if (const Status status =
-          options.Validate().and_then([&] { return CheckMosaics(stack, rig, mask); });
+          options.Validate().and_then([&] { return CheckMosaics(stack, rig, mask, options.least_squares); });
       !status) {
     return tl::unexpected(status.error());
   }
