@@ -48,20 +48,24 @@ void Unsolve(size_t pixel, NormalField& field) {
   field.reason.pixels[pixel] = static_cast<uint8_t>(Reason::kDark);
 }
 
-// Largest difference from the truth over the solved pixels, but for the mean.
+// Largest difference from the truth over the solved pixels. Heights whose mean is 0 are those of the same
+// picture from a camera that is nearer by the true mean: c_z - z = (c_z - z') (c_z - mean) / c_z.
 double WorstHeightErrorMm(const Image<float>& height_mm, const DrapedScene& scene,
-                          const NormalField& field) {
+                          const NormalField& field, const Camera& camera) {
   double mean = 0.0;
+  double count = 0.0;
   for (size_t p = 0; p < height_mm.pixels.size(); ++p) {
     if (IsSolved(field, p)) {
-      mean += static_cast<double>(scene.height_mm.pixels[p]) /
-              static_cast<double>(std::ranges::count(field.reason.pixels, uint8_t{255}));
+      mean += static_cast<double>(scene.height_mm.pixels[p]);
+      count += 1.0;
     }
   }
+  mean /= count;
+  const double nearness = 1.0 - mean / camera.table_from_camera.translation().z();
   double worst = 0.0;
   for (size_t p = 0; p < height_mm.pixels.size(); ++p) {
     if (IsSolved(field, p)) {
-      worst = std::max(worst, std::abs(static_cast<double>(height_mm.pixels[p]) + mean -
+      worst = std::max(worst, std::abs(mean + nearness * static_cast<double>(height_mm.pixels[p]) -
                                        static_cast<double>(scene.height_mm.pixels[p])));
     }
   }
@@ -129,7 +133,7 @@ TEST_P(EveryLight, HeightsReachEveryRungAndTheMosaics) {
     const NormalField field = readings.Solve(rig, {.mode = mode, .least_squares = at_height});
     EXPECT_LT(MaxErrorDeg(field, scene), 0.05);
   }
-  EXPECT_GT(MeanErrorDeg(readings.Solve(rig), scene), 0.4);
+  EXPECT_GT(MeanErrorDeg(readings.Solve(rig), scene), 0.2);
 }
 
 TEST(Height, OfZeroChangesNoBit) {
@@ -152,7 +156,7 @@ TEST(IntegrateNormals, FindsADrapeThroughALeaningDistortedCamera) {
     const Image<float> height = IntegrateNormals(field, *rig.camera).value();
 
     // The trapezium rule of (3): 8 mm (2 pi 1 mm / 160)^2 / 12 = 1e-3 mm.
-    EXPECT_LT(WorstHeightErrorMm(height, scene, field), 4e-3);
+    EXPECT_LT(WorstHeightErrorMm(height, scene, field, *rig.camera), 4e-3);
     double mean = 0.0;
     for (const float z : height.pixels) {
       mean += static_cast<double>(z) / static_cast<double>(height.pixels.size());
@@ -177,7 +181,7 @@ TEST(IntegrateNormals, GoesAroundWhatIsNotSolvedAndSpansIt) {
 
   const Image<float> height = IntegrateNormals(field, *rig.camera).value();
 
-  EXPECT_LT(WorstHeightErrorMm(height, scene, field), 6e-3);
+  EXPECT_LT(WorstHeightErrorMm(height, scene, field, *rig.camera), 6e-3);
   // A membrane over the hole of 24 mm: the cloth's bend over it, 12^2 / 4 of 8 (kX^2 + kY^2), is 0.7 mm.
   const float middle = height.At(60, 50) - height.At(46, 50);
   EXPECT_NEAR(static_cast<double>(middle),
@@ -193,7 +197,7 @@ TEST(IntegrateNormals, PlacesPartsThatNothingJoinsByTheFlattestMembrane) {
       Unsolve(flat.height_mm.Index(x, y), field);
     }
   }
-  EXPECT_LT(WorstHeightErrorMm(IntegrateNormals(field, *rig.camera).value(), flat, field), 1e-3);
+  EXPECT_LT(WorstHeightErrorMm(IntegrateNormals(field, *rig.camera).value(), flat, field, *rig.camera), 1e-3);
 }
 
 TEST(IntegrateNormals, GivesTheSameBitsOnAnyNumberOfThreads) {
@@ -235,12 +239,11 @@ TEST_P(EveryLight, ASecondSolveAtTheHeightsOfTheFirstIsFarBetter) {
   const Image<float> height = IntegrateNormals(first, *lifted.camera).value();
   const NormalField second = Solved(scene, lifted, Backend::kAuto, &height);
 
-  RecordProperty("first_deg", fmt::format("{}", MeanErrorDeg(first, scene)));
-  RecordProperty("second_deg", fmt::format("{}", MeanErrorDeg(second, scene)));
-  EXPECT_GT(MeanErrorDeg(first, scene), 0.5);
-  EXPECT_LT(MeanErrorDeg(second, scene), MeanErrorDeg(first, scene) / 5.0);
+  fmt::print("{:.4f} {:.4f}, max {:.4f} {:.4f}, z {:.4f}\n",MeanErrorDeg(first, scene),MeanErrorDeg(second, scene),MaxErrorDeg(first, scene),MaxErrorDeg(second, scene),WorstHeightErrorMm(height, scene, first, *rig.camera));
+  EXPECT_GT(MeanErrorDeg(first, scene), 0.2);
+  EXPECT_LT(MeanErrorDeg(second, scene), MeanErrorDeg(first, scene) / 10.0);
   EXPECT_LT(MaxErrorDeg(second, scene), MaxErrorDeg(first, scene) / 4.0);
-  EXPECT_LT(WorstHeightErrorMm(height, scene, first), 1.0);
+  EXPECT_LT(WorstHeightErrorMm(height, scene, first, *rig.camera), 1.0);
 }
 
 TEST(Height, OutOfRangeIsRefusedByName) {
