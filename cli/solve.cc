@@ -307,8 +307,7 @@ Status SolveWhole(const SolveArgs& args, const LambertianOptions& least_squares,
   }
   outcome.field = std::move(*field);
   std::optional<Image<float>> error_map_deg;
-  const Status solved =
-      args.relief ? SolveAtHeights(args, least_squares, task, outcome) : Status();
+  const Status solved = args.relief ? SolveAtHeights(args, least_squares, task, outcome) : Status();
   return solved.and_then([&] { return Evaluate(outcome, error_map_deg); }).and_then([&] {
     return StageAll(args, outcome, error_map_deg, task, folder);
   });

@@ -219,7 +219,8 @@ std::string TextReport(const SolveArgs& args, const SolveOutcome& outcome) {
   if (outcome.relief) {
     const ReliefOutcome& relief = *outcome.relief;
     text += fmt::format(
-        "relief from {:.4g} to {:.4g} mm, found in {:.3f} s; solving again with it turned the normals "
+        "relief from {:.4g} to {:.4g} mm, found in {:.3f} s; solving again with it turned the "
+        "normals "
         "by {:.3g} degrees in the mean, {:.3g} at most\n",
         relief.lowest_mm, relief.highest_mm, relief.seconds, relief.turned_deg.mean,
         relief.turned_deg.max);

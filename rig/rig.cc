@@ -213,15 +213,17 @@ Lights Rebalanced(Lights lights, const Eigen::Vector3d& from, const Eigen::Vecto
 Result<Rig> Lifted(Rig rig, double height_mm) {
   const auto lower = [&](double& z_mm, const std::string& what) -> Status {
     if (!(height_mm < z_mm)) {
-      return Fail(ErrorCode::kBadData, "the surface is at {:g} mm, but {} is at {:.6g} mm; need it below",
-                  height_mm, what, z_mm);
+      return Fail(ErrorCode::kBadData,
+                  "the surface is at {:g} mm, but {} is at {:.6g} mm; need it below", height_mm,
+                  what, z_mm);
     }
     z_mm -= height_mm;
     return {};
   };
-  Status status = std::isfinite(height_mm)
-                      ? Status()
-                      : Fail(ErrorCode::kBadData, "the surface is at {} mm; need a number", height_mm);
+  Status status =
+      std::isfinite(height_mm)
+          ? Status()
+          : Fail(ErrorCode::kBadData, "the surface is at {} mm; need a number", height_mm);
   if (status && rig.camera && rig.camera->has_pose) {
     status = lower(rig.camera->table_from_camera.translation().z(), "the camera");
   }

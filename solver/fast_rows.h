@@ -19,7 +19,7 @@ struct ListedPixels {
   std::vector<size_t> pixels;
   std::vector<float> x_mm;  // zero where all lights are distant
   std::vector<float> y_mm;
-  std::vector<float> z_mm;  // empty where the surface is the table plane
+  std::vector<float> z_mm;                // empty where the surface is the table plane
   std::vector<std::vector<float>> gains;  // of each light; empty without a field
 
   // Appends pixels whose geometry starts with pixel `first`.

@@ -20,8 +20,8 @@ namespace {
 constexpr int kRowsAtOnce = 16;
 constexpr int kLargestFactor = 13;  // of the transform's sides: larger ones are slow
 constexpr int kMostSteps = 100;
-constexpr double kTolerance = 1e-4;      // of the misfit, in the preconditioner's norm
-constexpr double kLeastFacing = 0.1;     // n . v / |v|
+constexpr double kTolerance = 1e-4;   // of the misfit, in the preconditioner's norm
+constexpr double kLeastFacing = 0.1;  // n . v / |v|
 
 bool IsGoodSide(int side) {
   for (int factor = 2; factor <= kLargestFactor; ++factor) {
@@ -69,7 +69,8 @@ class Membrane {
       }
       const auto keep = static_cast<float>(step == 0 ? 0.0 : now / before);
       before = now;
-      ForPixels([&](size_t p) { direction.pixels[p] = image.pixels[p] + keep * direction.pixels[p]; });
+      ForPixels(
+          [&](size_t p) { direction.pixels[p] = image.pixels[p] + keep * direction.pixels[p]; });
       Apply(direction, image);
       const auto length = static_cast<float>(now / Dot(direction, image));
       ForPixels([&](size_t p) {
@@ -97,11 +98,12 @@ class Membrane {
   template <typename Body>
   void ForRows(const Body& body) const {
     const Task unheeded{.threads = task_.threads};  // steps are checked, not rows
-    const Status status = ParallelFor(known_.height, kRowsAtOnce, unheeded, [&](int begin, int end) {
-      for (int row = begin; row < end; ++row) {
-        body(row);
-      }
-    });
+    const Status status =
+        ParallelFor(known_.height, kRowsAtOnce, unheeded, [&](int begin, int end) {
+          for (int row = begin; row < end; ++row) {
+            body(row);
+          }
+        });
     SATEEN_CHECK(status.has_value());
   }
 
@@ -187,12 +189,12 @@ struct SlopeRow {
     grid.Row(row, x_mm, y_mm);
     for (size_t x = 0; x < width; ++x) {
       const size_t p = field.reason.Index(0, row) + x;
-      const Eigen::Vector3d n = Eigen::Vector3f(field.normal[0].pixels[p], field.normal[1].pixels[p],
-                                                field.normal[2].pixels[p])
-                                    .cast<double>();
-      const Eigen::Vector3d v(
-          (c.x() - static_cast<double>(x_mm[x])) / c.z(),
-          (c.y() - static_cast<double>(y_mm[x])) / c.z(), 1.0);
+      const Eigen::Vector3d n =
+          Eigen::Vector3f(field.normal[0].pixels[p], field.normal[1].pixels[p],
+                          field.normal[2].pixels[p])
+              .cast<double>();
+      const Eigen::Vector3d v((c.x() - static_cast<double>(x_mm[x])) / c.z(),
+                              (c.y() - static_cast<double>(y_mm[x])) / c.z(), 1.0);
       const double facing = n.dot(v);
       const bool is_known = IsSolved(field, p) && facing > kLeastFacing * v.norm();
       known[x] = is_known ? 1 : 0;
@@ -221,7 +223,8 @@ Image<float> RisesOf(const NormalField& field, const TableGrid& grid, const Eige
   for (int v = 0; v < field.reason.height; ++v) {
     std::swap(above, row);
     row.Read(field, grid, c, v);
-    std::ranges::copy(row.known, known.pixels.begin() + static_cast<std::ptrdiff_t>(known.Index(0, v)));
+    std::ranges::copy(row.known,
+                      known.pixels.begin() + static_cast<std::ptrdiff_t>(known.Index(0, v)));
     for (size_t x = 0; x < row.known.size(); ++x) {
       const size_t p = known.Index(0, v) + x;
       if (x > 0 && row.known[x - 1] != 0 && row.known[x] != 0) {

@@ -60,8 +60,8 @@ Status CheckMosaics(const MosaicStack& stack, const Rig& rig, const std::optiona
     return Fail(ErrorCode::kBadData, "the mask is {}x{} px but the frames are {}x{} px",
                 mask->width, mask->height, size.width, size.height);
   }
-  if (Status status = rig.Validate("rig").and_then(
-          [&] { return CheckHeight(options.height_mm, rig, size); });
+  if (Status status =
+          rig.Validate("rig").and_then([&] { return CheckHeight(options.height_mm, rig, size); });
       !status || AllDistant(rig.lights)) {
     return status;
   }
@@ -270,8 +270,8 @@ Result<SolveSummary> SolveBandsBy(const MosaicStack& stack, const Rig& rig,
                                   const Task& task,
                                   const std::function<Status(BandSolver&)>& solve_bands) {
   const Clock::time_point start = Clock::now();
-  if (const Status status =
-          options.Validate().and_then([&] { return CheckMosaics(stack, rig, mask, options.least_squares); });
+  if (const Status status = options.Validate().and_then(
+          [&] { return CheckMosaics(stack, rig, mask, options.least_squares); });
       !status) {
     return tl::unexpected(status.error());
   }

@@ -66,9 +66,8 @@ void MosaicSite::Gather(int column, int row, const std::vector<uint16_t>& readin
                         SiteSolution& solution) {
   const size_t site = static_cast<size_t>(row % 2 * 2 + column % 2);
   const std::optional<Eigen::Vector3d> x_mm =
-      needs_position_
-          ? TablePointOfPixel(*rig_.camera, column, row, options_.HeightAt(column, row))
-          : Eigen::Vector3d::Zero();
+      needs_position_ ? TablePointOfPixel(*rig_.camera, column, row, options_.HeightAt(column, row))
+                      : Eigen::Vector3d::Zero();
   int unsaturated = 0;
   int saturated = 0;
   bool bright = false;

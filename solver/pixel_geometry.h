@@ -17,7 +17,8 @@ struct PixelGeometry {
   std::vector<float> y_mm;
   std::vector<float> z_mm;  // empty where the surface is the table plane
   std::vector<float> gains;
-  std::vector<const float*> places;  // of each light's gains, or null; empty where no light has a field
+  std::vector<const float*>
+      places;  // of each light's gains, or null; empty where no light has a field
 };
 
 /// Finds the geometry of an image's rows. Without heights a pixel lies where its ray meets the table plane,

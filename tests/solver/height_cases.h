@@ -84,8 +84,8 @@ inline DrapedScene RenderDrape(const Drape& drape, const Rig& rig) {
 inline Rig CloseRig(ImageSize size, LightModel model = LightModel::kNear) {
   Rig rig;
   rig.camera = OverheadCamera(size, 500.0, 140.0);
-  rig.camera->table_from_camera = Eigen::AngleAxisd(8.0 * kRadPerDeg, Eigen::Vector3d::UnitY()) *
-                                  rig.camera->table_from_camera;
+  rig.camera->table_from_camera =
+      Eigen::AngleAxisd(8.0 * kRadPerDeg, Eigen::Vector3d::UnitY()) * rig.camera->table_from_camera;
   rig.lights = LedRing(model, 10, 45.0 * kRadPerDeg, 280.0);
   const Lights high = LedRing(model, 10, 25.0 * kRadPerDeg, 280.0);
   for (size_t k = 0; k < rig.lights.size(); k += 2) {

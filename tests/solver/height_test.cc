@@ -79,15 +79,14 @@ INSTANTIATE_TEST_SUITE_P(Lights, EveryLight,
 
 TEST_P(EveryLight, ALiftedRigSolvesAThickClothAsExactlyAsOneOnTheTable) {
   const Rig rig = CloseRig(kDrapeSize, GetParam());
-  const DrapedScene thick = RenderDrape({.mean_mm = 5.0, .ripple_mm = 0.3}, rig);
-  // The ripple is too low to matter, but not to float: 0.3 mm of 280 are 0.06 degrees.
   const DrapedScene flat = RenderDrape({.mean_mm = 5.0}, rig);
+  const DrapedScene ribbed = RenderDrape({.mean_mm = 5.0, .ripple_mm = 0.3}, rig);
   const Rig lifted = Lifted(rig, 5.0).value();
 
-  EXPECT_LT(MaxErrorDeg(Solved(flat, lifted), flat), 2e-4);  // 2e-5 in the mean: exact data
-  EXPECT_LT(MaxErrorDeg(Solved(thick, lifted), thick), 0.15);
-  // Irradiance changes by 2 z / s_z, 5 %, and directions by z sin / s, 0.7 degrees.
-  EXPECT_GT(MeanErrorDeg(Solved(flat, rig), flat), 0.3);
+  EXPECT_LT(MaxErrorDeg(Solved(flat, lifted), flat), 5e-5);     // as exact data on the table
+  EXPECT_LT(MaxErrorDeg(Solved(ribbed, lifted), ribbed), 0.1);  // 0.3 mm of 280 mm are 0.06 degrees
+  // Directions are off by 5 mm sin 45 of 280 mm, 0.7 degrees, which the lights share in part.
+  EXPECT_GT(MeanErrorDeg(Solved(flat, rig), flat), 0.4);
   EXPECT_GT(MeanErrorDeg(Solved(flat, Lifted(rig, -5.0).value()), flat),
             1.8 * MeanErrorDeg(Solved(flat, rig), flat));  // the wrong way: twice as far off
 }
@@ -103,7 +102,7 @@ TEST_P(EveryLight, HeightsOfEachPixelAreExactInEveryBackend) {
 
   for (const Backend backend : kAllBackends) {
     SCOPED_TRACE(Name(backend));
-    EXPECT_LT(MaxErrorDeg(Solved(scene, rig, backend, &scene.height_mm), scene), 3e-4);
+    EXPECT_LT(MaxErrorDeg(Solved(scene, rig, backend, &scene.height_mm), scene), 5e-5);
   }
   EXPECT_GT(MeanErrorDeg(Solved(scene, rig), scene), 0.4);
   EXPECT_GT(MeanErrorDeg(Solved(scene, rig, Backend::kAuto, &wrong_way), scene),
@@ -120,18 +119,19 @@ TEST_P(EveryLight, HeightsReachEveryRungAndTheMosaics) {
                        {.mode = mode, .least_squares = at_height})
         .value();
   };
-  EXPECT_LT(MaxErrorDeg(solve_rung(LadderMode::kLeastSquares), scene), 3e-4);
-  EXPECT_LT(MaxErrorDeg(solve_rung(LadderMode::kConsensus), scene), 3e-3);
+  EXPECT_LT(MaxErrorDeg(solve_rung(LadderMode::kLeastSquares), scene), 1e-4);
+  EXPECT_LT(MaxErrorDeg(solve_rung(LadderMode::kConsensus), scene), 1e-4);
   Readings readings(scene.rendered, rig);
-  // Readings of 16 bits: half a step of 64,000 at a third of full scale is 3e-3 degrees.
+  // Half a step of 16 bits at a third of full scale is 1.4e-3 degrees.
   for (const Backend backend : {Backend::kAuto, Backend::kJacobiSvd}) {
-    const NormalField plain = readings.Solve(
-        rig, {.mode = std::nullopt, .least_squares = {.backend = backend, .height_mm = &scene.height_mm}});
-    EXPECT_LT(MaxErrorDeg(plain, scene), 0.02);
+    const NormalField plain =
+        readings.Solve(rig, {.mode = std::nullopt,
+                             .least_squares = {.backend = backend, .height_mm = &scene.height_mm}});
+    EXPECT_LT(MaxErrorDeg(plain, scene), 4e-3);
   }
   for (const LadderMode mode : {LadderMode::kAuto, LadderMode::kConsensus}) {
     const NormalField field = readings.Solve(rig, {.mode = mode, .least_squares = at_height});
-    EXPECT_LT(MaxErrorDeg(field, scene), 0.05);
+    EXPECT_LT(MaxErrorDeg(field, scene), mode == LadderMode::kAuto ? 4e-3 : 0.03);  // of triples
   }
   EXPECT_GT(MeanErrorDeg(readings.Solve(rig), scene), 0.2);
 }
@@ -146,8 +146,8 @@ TEST(Height, OfZeroChangesNoBit) {
 }
 
 TEST(IntegrateNormals, FindsADrapeThroughALeaningDistortedCamera) {
-  // Odd sides and a large prime, so that the transform is larger than the image.
-  for (const ImageSize size : {ImageSize{140, 106}, ImageSize{139, 107}}) {
+  // Sides that the transform takes, and an odd one and one of a large prime, for which it is larger.
+  for (const ImageSize size : {ImageSize{140, 108}, ImageSize{139, 106}}) {
     Rig rig = CloseRig(size);
     rig.camera->distortion = {-0.1, 0.02, 1e-3, -5e-4, 0.0};
     const DrapedScene scene = RenderDrape({.amplitude_mm = 8.0}, rig);
@@ -155,8 +155,8 @@ TEST(IntegrateNormals, FindsADrapeThroughALeaningDistortedCamera) {
 
     const Image<float> height = IntegrateNormals(field, *rig.camera).value();
 
-    // The trapezium rule of (3): 8 mm (2 pi 1 mm / 160)^2 / 12 = 1e-3 mm.
-    EXPECT_LT(WorstHeightErrorMm(height, scene, field, *rig.camera), 4e-3);
+    // (3) is the trapezium rule: at 1 mm a pixel off by (z''(b) - z''(a)) / 12 mm^2, 2e-3 mm.
+    EXPECT_LT(WorstHeightErrorMm(height, scene, field, *rig.camera), 3e-3);
     double mean = 0.0;
     for (const float z : height.pixels) {
       mean += static_cast<double>(z) / static_cast<double>(height.pixels.size());
@@ -181,7 +181,7 @@ TEST(IntegrateNormals, GoesAroundWhatIsNotSolvedAndSpansIt) {
 
   const Image<float> height = IntegrateNormals(field, *rig.camera).value();
 
-  EXPECT_LT(WorstHeightErrorMm(height, scene, field, *rig.camera), 6e-3);
+  EXPECT_LT(WorstHeightErrorMm(height, scene, field, *rig.camera), 3e-3);
   // A membrane over the hole of 24 mm: the cloth's bend over it, 12^2 / 4 of 8 (kX^2 + kY^2), is 0.7 mm.
   const float middle = height.At(60, 50) - height.At(46, 50);
   EXPECT_NEAR(static_cast<double>(middle),
@@ -197,7 +197,9 @@ TEST(IntegrateNormals, PlacesPartsThatNothingJoinsByTheFlattestMembrane) {
       Unsolve(flat.height_mm.Index(x, y), field);
     }
   }
-  EXPECT_LT(WorstHeightErrorMm(IntegrateNormals(field, *rig.camera).value(), flat, field, *rig.camera), 1e-3);
+  EXPECT_LT(
+      WorstHeightErrorMm(IntegrateNormals(field, *rig.camera).value(), flat, field, *rig.camera),
+      1e-3);
 }
 
 TEST(IntegrateNormals, GivesTheSameBitsOnAnyNumberOfThreads) {
@@ -239,11 +241,13 @@ TEST_P(EveryLight, ASecondSolveAtTheHeightsOfTheFirstIsFarBetter) {
   const Image<float> height = IntegrateNormals(first, *lifted.camera).value();
   const NormalField second = Solved(scene, lifted, Backend::kAuto, &height);
 
-  fmt::print("{:.4f} {:.4f}, max {:.4f} {:.4f}, z {:.4f}\n",MeanErrorDeg(first, scene),MeanErrorDeg(second, scene),MaxErrorDeg(first, scene),MaxErrorDeg(second, scene),WorstHeightErrorMm(height, scene, first, *rig.camera));
+  fmt::print("{}: mean {:.4f} degrees, then {:.4f}; worst {:.3f}, then {:.3f}\n", Name(GetParam()),
+             MeanErrorDeg(first, scene), MeanErrorDeg(second, scene), MaxErrorDeg(first, scene),
+             MaxErrorDeg(second, scene));
   EXPECT_GT(MeanErrorDeg(first, scene), 0.2);
   EXPECT_LT(MeanErrorDeg(second, scene), MeanErrorDeg(first, scene) / 10.0);
-  EXPECT_LT(MaxErrorDeg(second, scene), MaxErrorDeg(first, scene) / 4.0);
-  EXPECT_LT(WorstHeightErrorMm(height, scene, first, *rig.camera), 1.0);
+  EXPECT_LT(MaxErrorDeg(second, scene), MaxErrorDeg(first, scene) / 10.0);
+  EXPECT_LT(WorstHeightErrorMm(height, scene, first, *rig.camera), 0.7);
 }
 
 TEST(Height, OutOfRangeIsRefusedByName) {
@@ -254,7 +258,8 @@ TEST(Height, OutOfRangeIsRefusedByName) {
         .error()
         .message;
   };
-  EXPECT_THAT(message(Image<float>(3, 2)), HasSubstr("heights are 3x2 px but the frames are 140x106"));
+  EXPECT_THAT(message(Image<float>(3, 2)),
+              HasSubstr("heights are 3x2 px but the frames are 140x106"));
   EXPECT_THAT(message(Image<float>(140, 106, std::numeric_limits<float>::quiet_NaN())),
               HasSubstr("need finite numbers"));
   EXPECT_THAT(message(Image<float>(140, 106, 260.0F)), HasSubstr("rises to 260 mm, but lights["));
