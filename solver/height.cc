@@ -18,7 +18,7 @@ namespace sateen {
 namespace {
 
 constexpr int kRowsAtOnce = 16;
-constexpr int kLargestFactor = 13;  // of the transform's sides: larger ones are slow
+constexpr int kLargestFactor = 17;  // of the transform's sides: larger ones are slow
 constexpr int kMostSteps = 100;
 constexpr double kTolerance = 1e-4;   // of the misfit, in the preconditioner's norm
 constexpr double kLeastFacing = 0.1;  // n . v / |v|

@@ -27,9 +27,9 @@ namespace sateen {
 /// Returns  z in millimetres, H x W, also where unsolved
 /// Errors   kBadData: sizes disagree; no pose; a pixel that does not see the table
 ///          kDegenerate: no pixel has a normal; kCancelled
-/// Cost     conjugate gradients with the unmasked equations for preconditioner, by cosine transform: 2 steps
-///          where all pixels are solved, up to 100 where many are not; 0.1 us a pixel and step, 20 bytes
-///          a pixel; the same bits for any number of threads
+/// Cost     conjugate gradients with the equations without gaps for preconditioner, by cosine transform: 2 steps
+///          where all pixels are solved, some 10 and at most 100 where many are not; 0.1 us a pixel and step,
+///          25 bytes a pixel; the same bits for any number of threads
 /// Source   (4) without gaps: Simchony, Chellappa and Shao, "Direct analytical methods for solving Poisson
 ///          equations in computer vision problems", PAMI 12(5), 1990; with gaps: Ghiglia and Romero, "Robust
 ///          two-dimensional weighted and unweighted phase unwrapping", JOSA A 11(1), 1994; logarithm: Durou and Courteille,
