@@ -1,9 +1,11 @@
 #include "cli/solve.h"
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <filesystem>
+#include <limits>
 #include <ostream>
 #include <utility>
 
@@ -11,6 +13,9 @@
 #include "cli/mosaic_maps.h"
 #include "cli/solve_report.h"
 #include "core/output_folder.h"
+#include "imaging/image_io.h"
+#include "solver/fast_rows.h"
+#include "solver/height.h"
 #include "solver/ladder.h"
 #include "solver/mosaic.h"
 #include "solver/undistort.h"
@@ -150,6 +155,13 @@ Status CheckSupported(const SolveArgs& args, Capture& capture) {
                 "lens, or name a rig that has one with --rig",
                 args.capture.string());
   }
+  if ((args.relief || args.height_mm != 0.0) && AllDistant(capture.rig.lights)) {
+    return Fail(ErrorCode::kBadData,
+                "{}: all {} lights are distant, and their light is the same at every height; {} "
+                "needs lights with a place: near, led or led+field, and a calibrated camera",
+                args.capture.string(), capture.rig.lights.size(),
+                args.relief ? "--relief" : "--height");
+  }
   std::error_code ignored;  // a folder that does not exist yet is no other folder
   if (std::filesystem::equivalent(args.capture, args.output, ignored)) {
     return Fail(ErrorCode::kInvalidArgument,
@@ -205,6 +217,22 @@ Status StageAll(const SolveArgs& args, const SolveOutcome& outcome,
   });
 }
 
+// height.exr; nothing without --relief.
+Status StageHeight(const SolveArgs& args, const SolveOutcome& outcome, const Task& task,
+                   OutputFolder& folder) {
+  if (!outcome.relief) {
+    folder.Retire("height.exr");
+    return {};
+  }
+  if (!args.undistort) {
+    return WriteExr(folder.Stage("height.exr"), outcome.relief->height_mm);
+  }
+  return Undistorted(outcome.relief->height_mm, *outcome.capture.rig.camera, task)
+      .and_then([&](const Image<float>& straight) {
+        return WriteExr(folder.Stage("height.exr"), straight);
+      });
+}
+
 Result<NormalField> SolveStack(const SolveArgs& args, const LambertianOptions& least_squares,
                                const Capture& capture, const Task& task) {
   const std::optional<LadderMode> mode = LadderModeNamed(args.robust);
@@ -223,7 +251,7 @@ Result<NormalField> SolveStack(const SolveArgs& args, const LambertianOptions& l
 
 // Maps that need no other row of themselves than the one that is written.
 bool CanStream(const SolveArgs& args, const Capture& capture) {
-  return capture.mosaics && !capture.truth && !args.undistort;
+  return capture.mosaics && !capture.truth && !args.undistort && !args.relief;
 }
 
 Status SolveByBands(const SolveArgs& args, const LambertianOptions& least_squares, const Task& task,
@@ -235,6 +263,42 @@ Status SolveByBands(const SolveArgs& args, const LambertianOptions& least_square
       .map([&](const SolveSummary& summary) { outcome.field.summary = summary; });
 }
 
+// Solves once more, with the point of each pixel at the height that the normals give it.
+Status SolveAtHeights(const SolveArgs& args, const LambertianOptions& least_squares,
+                      const Task& task, SolveOutcome& outcome) {
+  const Clock::time_point start = Clock::now();
+  Result<Image<float>> height_mm =
+      IntegrateNormals(outcome.field, *outcome.capture.rig.camera, task);
+  if (!height_mm) {
+    return tl::unexpected(height_mm.error());
+  }
+  ReliefOutcome relief{.seconds = SecondsSince(start)};
+  LambertianOptions at_heights = least_squares;
+  at_heights.height_mm = &*height_mm;
+  Result<NormalField> again = SolveStack(args, at_heights, outcome.capture, task);
+  if (!again) {
+    return tl::unexpected(again.error());
+  }
+  const Result<ErrorStatistics> turned = AngularErrorDeg(*again, outcome.field.normal);
+  if (!turned) {
+    return tl::unexpected(turned.error());
+  }
+  relief.turned_deg = *turned;
+  relief.lowest_mm = std::numeric_limits<double>::infinity();
+  relief.highest_mm = -relief.lowest_mm;
+  for (size_t p = 0; p < height_mm->pixels.size(); ++p) {
+    height_mm->pixels[p] += static_cast<float>(args.height_mm);
+    if (IsSolved(*again, p)) {
+      relief.lowest_mm = std::min(relief.lowest_mm, static_cast<double>(height_mm->pixels[p]));
+      relief.highest_mm = std::max(relief.highest_mm, static_cast<double>(height_mm->pixels[p]));
+    }
+  }
+  relief.height_mm = *std::move(height_mm);
+  outcome.relief = std::move(relief);
+  outcome.field = *std::move(again);
+  return {};
+}
+
 Status SolveWhole(const SolveArgs& args, const LambertianOptions& least_squares, const Task& task,
                   OutputFolder& folder, SolveOutcome& outcome) {
   Result<NormalField> field = SolveStack(args, least_squares, outcome.capture, task);
@@ -243,7 +307,8 @@ Status SolveWhole(const SolveArgs& args, const LambertianOptions& least_squares,
   }
   outcome.field = std::move(*field);
   std::optional<Image<float>> error_map_deg;
-  return Evaluate(outcome, error_map_deg).and_then([&] {
+  const Status solved = args.relief ? SolveAtHeights(args, least_squares, task, outcome) : Status();
+  return solved.and_then([&] { return Evaluate(outcome, error_map_deg); }).and_then([&] {
     return StageAll(args, outcome, error_map_deg, task, folder);
   });
 }
@@ -268,6 +333,13 @@ Result<SolveOutcome> SolveCapture(const SolveArgs& args, const Task& task, std::
   if (Status status = CheckSupported(args, *capture); !status) {
     return tl::unexpected(status.error());
   }
+  if (args.height_mm != 0.0) {
+    Result<Rig> lifted = Lifted(std::move(capture->rig), args.height_mm);
+    if (!lifted) {
+      return tl::unexpected(lifted.error());
+    }
+    capture->rig = *std::move(lifted);
+  }
   task.ClearProgress();
   for (const std::string& warning : capture->warnings) {
     log << "sateen solve: warning: " << warning << '\n';
@@ -278,6 +350,9 @@ Result<SolveOutcome> SolveCapture(const SolveArgs& args, const Task& task, std::
   Status status = CanStream(args, outcome.capture)
                       ? SolveByBands(args, options, task, *folder, outcome)
                       : SolveWhole(args, options, task, *folder, outcome);
+  if (status) {
+    status = StageHeight(args, outcome, task, *folder);
+  }
   if (status) {
     status = task.CheckCancelled();
   }
@@ -371,6 +446,14 @@ void AddSolve(CLI::App& root, SolveArgs& args) {
                   "What integer files hold; auto: 8 bits are sRGB, 16 bits are linear")
       ->check(CLI::IsMember({"auto", "linear", "srgb"}))
       ->capture_default_str();
+  cmd->add_option("--height", args.height_mm,
+                  "The surface lies so many millimetres above the table's plane in the mean, as a "
+                  "thick cloth does; for near lights")
+      ->check(CLI::Number)
+      ->capture_default_str();
+  cmd->add_flag("--relief", args.relief,
+                "Find each pixel's height from the normals and solve once more with it, for relief "
+                "that near lights see; maps are held whole in memory, height.exr is written");
   cmd->add_option("--threads", args.threads, "Threads to use; 0: one for each core")
       ->check(CLI::Range(0, 1024))
       ->capture_default_str();

@@ -30,8 +30,19 @@ struct SolveArgs {
   int threads = 0;
   // Largest mean angular error from truth that passes, in (0, 180]; the capture must have truth.
   std::optional<double> fail_above_deg;
+  double height_mm = 0.0;  // of the surface above the table's plane
+  bool relief = false;     // solve again with each pixel at its own height
   bool undistort = false;  // maps as the ideal pinhole camera would have them
   bool json = false;
+};
+
+// What --relief found.
+struct ReliefOutcome {
+  Image<float> height_mm;  // above the table's plane
+  double lowest_mm = 0.0;  // of the solved pixels
+  double highest_mm = 0.0;
+  ErrorStatistics turned_deg;  // normals of the second solve against the first's
+  double seconds = 0.0;        // that the heights took, without either solve
 };
 
 // Everything that a report speaks of.
@@ -39,6 +50,7 @@ struct SolveOutcome {
   Capture capture;
   // Of captures that are solved band by band straight into maps the summary alone.
   NormalField field;
+  std::optional<ReliefOutcome> relief;
   std::optional<ErrorStatistics> angular_error_deg;
   std::optional<ErrorStatistics> low_frequency_error_deg;  // where the rig has a camera, too
   std::optional<ErrorStatistics> albedo_error;

@@ -26,6 +26,8 @@ nlohmann::json OptionsToJson(const SolveArgs& args) {
           {"dark_level", args.solver.dark_level},
           {"max_condition", args.solver.max_condition},
           {"normal_y", args.normal_y},
+          {"height_mm", args.height_mm},
+          {"relief", args.relief},
           {"undistort", args.undistort},
           {"encoding", args.encoding}};
 }
@@ -188,6 +190,11 @@ std::string JsonReport(const SolveArgs& args, const SolveOutcome& outcome) {
   if (outcome.albedo_error) {
     report["albedo_error"] = ToJson(*outcome.albedo_error);
   }
+  if (outcome.relief) {
+    report["relief"] = {{"height_mm", {outcome.relief->lowest_mm, outcome.relief->highest_mm}},
+                        {"turned_deg", ToJson(outcome.relief->turned_deg)},
+                        {"seconds", outcome.relief->seconds}};
+  }
   if (args.undistort) {
     const Camera& camera = *outcome.capture.rig.camera;
     report["map_camera"] = {{"k", {camera.fx, camera.fy, camera.cx, camera.cy}},
@@ -231,6 +238,15 @@ std::string TextReport(const SolveArgs& args, const SolveOutcome& outcome) {
   }
   if (args.robust != "none") {
     text += LadderWords(summary);
+  }
+  if (outcome.relief) {
+    const ReliefOutcome& relief = *outcome.relief;
+    text += fmt::format(
+        "relief from {:.4g} to {:.4g} mm, found in {:.3f} s; solving again with it turned the "
+        "normals "
+        "by {:.3g} degrees in the mean, {:.3g} at most\n",
+        relief.lowest_mm, relief.highest_mm, relief.seconds, relief.turned_deg.mean,
+        relief.turned_deg.max);
   }
   if (outcome.angular_error_deg) {
     const ErrorStatistics& error = *outcome.angular_error_deg;

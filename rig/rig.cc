@@ -210,6 +210,38 @@ Lights Rebalanced(Lights lights, const Eigen::Vector3d& from, const Eigen::Vecto
   return lights;
 }
 
+Result<Rig> Lifted(Rig rig, double height_mm) {
+  const auto lower = [&](double& z_mm, const std::string& what) -> Status {
+    if (!(height_mm < z_mm)) {
+      return Fail(ErrorCode::kBadData,
+                  "the surface is at {:g} mm, but {} is at {:.6g} mm; need it below", height_mm,
+                  what, z_mm);
+    }
+    z_mm -= height_mm;
+    return {};
+  };
+  Status status =
+      std::isfinite(height_mm)
+          ? Status()
+          : Fail(ErrorCode::kBadData, "the surface is at {} mm; need a number", height_mm);
+  if (status && rig.camera && rig.camera->has_pose) {
+    status = lower(rig.camera->table_from_camera.translation().z(), "the camera");
+  }
+  for (size_t k = 0; status && k < rig.lights.size(); ++k) {
+    Light& light = rig.lights[k];
+    if (light.model == LightModel::kDistant) {
+      continue;
+    }
+    const double above_table_mm = light.position_mm.z();
+    status = lower(light.position_mm.z(), fmt::format("lights[{}]", k));
+    const double nearer = light.position_mm.z() / above_table_mm;
+    const Eigen::Vector2d foot_mm = light.position_mm.head<2>();
+    light.field.origin_mm = foot_mm + (light.field.origin_mm - foot_mm) * nearer;  // (1)
+    light.field.spacing_mm *= nearer;
+  }
+  return status.map([&] { return std::move(rig); });
+}
+
 Result<Rig> ReadRig(const std::filesystem::path& path) {
   const Result<Json> file = ReadJsonFile(path, "sateen.rig", 1);
   if (!file) {

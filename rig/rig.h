@@ -41,6 +41,17 @@ struct Rig {
 [[nodiscard]] Lights Rebalanced(Lights lights, const Eigen::Vector3d& from,
                                 const Eigen::Vector3d& to);
 
+/// The same rig seen from a table plane that lies `height_mm` higher: camera and lights by that much lower,
+/// and each field of gains as the light's rays throw it onto the new plane,
+///
+///     x' = s + (x - s) (s_z - height) / s_z                                                   (1)
+///
+/// of its knots, which is exact: light and irradiance at a point of space stay what they are. What takes the
+/// surface to lie in z = 0 has it at z = height then.
+///
+/// Errors   kBadData: not a number; the camera or a light that is not distant is not above the new plane
+[[nodiscard]] Result<Rig> Lifted(Rig rig, double height_mm);
+
 // Errors   kIo: the file is absent or unreadable
 //          kBadData: not schema sateen.rig/1; a key that is missing, unknown, out of range or not
 //          of the light's model; a light that is not above the table

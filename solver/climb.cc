@@ -148,38 +148,41 @@ void ClimbPixels(const Climb& climb, const ListedPixels& listed, NormalField& fi
   JudgeConsensus(pixels, before, EstimatesAt(field, pixels, albedo), agreeing, field, summary);
 }
 
-// Rung 3 for those of `count` pixels that the scene's lobe explains, also where rung 1 does so by chance.
-void SolveUnderLobe(const Climb& climb, size_t first, size_t count, NormalField& field,
-                    PieceSummary& summary) {
+// Rung 3 for those pixels from `first` on that the scene's lobe explains and rung 1 does not explain better.
+void SolveUnderLobe(const Climb& climb, size_t first, std::span<const float> misfits,
+                    NormalField& field, PieceSummary& summary) {
   PixelSystem system(climb.stack, climb.rig, climb.options.least_squares);
   const auto width = static_cast<size_t>(field.reason.width);
-  const double noise_scale = std::sqrt(climb.scale_squared);
-  for (size_t j = 0; j < count; ++j) {
+  for (size_t j = 0; j < misfits.size(); ++j) {
     const size_t pixel = first + j;
     const auto column = static_cast<int>(pixel % width);
     const auto row = static_cast<int>(pixel / width);
-    if (!IsSolved(field, pixel)) {
+    const std::optional<Eigen::Vector3d> v =
+        IsSolved(field, pixel) ? ViewOf(climb.rig, column, row) : std::nullopt;
+    if (!v) {
       continue;
     }
-    const std::optional<Eigen::Vector3d> v = ViewOf(climb.rig, column, row);
     system.Gather(column, row);
-    const auto limit = static_cast<double>(climb.limit[field.samples.pixels[pixel]]);
-    const LobeAnswer answer =
-        v ? SolveLobe(LobeSamplesOf(system, climb.noise, *v, limit), *climb.lobe) : LobeAnswer{};
-    if (answer.n.isZero() || !(answer.misfit <= limit)) {
+    const LobeSamples samples =
+        LobeSamplesOf(system, climb.noise, climb.scale_squared, *v,
+                      static_cast<double>(climb.limit[field.samples.pixels[pixel]]));
+    const LobeAnswer answer = SolveLobe(samples, *climb.lobe);
+    if (answer.n.isZero() || !(answer.misfit <= samples.limit)) {
       continue;
     }
-    const Eigen::Vector3d n = answer.n.normalized();
-    for (size_t c = 0; c < 3; ++c) {
-      const auto column_of = static_cast<Eigen::Index>(c);
-      field.normal[c].pixels[pixel] = static_cast<float>(n[column_of]);
-      field.albedo[c].pixels[pixel] = static_cast<float>(answer.albedo[column_of]);
+    const Eigen::Vector3f albedo = answer.albedo.cast<float>();
+    const float luminance =
+        kLuminance[0] * albedo[0] + kLuminance[1] * albedo[1] + kLuminance[2] * albedo[2];
+    const Estimate of_rung_1 = EstimatesAt(field, std::span(&pixel, 1), [&](size_t p) {
+                                 return AlbedoAt(field, p);
+                               }).front();
+    if (TakesLobe(answer, luminance, climb.lobe->share,
+                  static_cast<double>(misfits[j]) / climb.scale_squared, of_rung_1, field, pixel)) {
+      for (size_t c = 0; c < 3; ++c) {
+        field.albedo[c].pixels[pixel] = albedo[static_cast<Eigen::Index>(c)];
+      }
+      ++summary.lobe;
     }
-    field.residual.pixels[pixel] = static_cast<float>(answer.residual);
-    StoreLobeUncertainty(answer, noise_scale, field, pixel);
-    field.model.pixels[pixel] = static_cast<uint8_t>(Rung::kLobe);
-    summary.lobe_deg += static_cast<double>(field.uncertainty.pixels[pixel]);
-    ++summary.lobe;
   }
 }
 
@@ -193,11 +196,17 @@ void SolvePiece(const Climb& climb, int begin, int end, NormalField& field, Piec
   const std::span<float> misfits(memory.get(), count);
   climb.rows.SolveWeighted(begin, end, geometry, std::sqrt(climb.scale_squared), field, misfits,
                            summary.counts);
+  if (climb.lobe) {
+    summary.lobe_seconds +=
+        SecondsOf([&] { SolveUnderLobe(climb, first, misfits, field, summary); });
+  }
   for (int row = begin; climb.light_doubt && row < end; ++row) {
     climb.light_doubt->AddToRow(row, field.reason.Index(0, row), field);
   }
-  if (climb.lobe) {
-    summary.lobe_seconds += SecondsOf([&] { SolveUnderLobe(climb, first, count, field, summary); });
+  for (size_t p = first; climb.lobe && p < first + count; ++p) {
+    summary.lobe_deg += field.model.pixels[p] == static_cast<uint8_t>(Rung::kLobe)
+                            ? static_cast<double>(field.uncertainty.pixels[p])
+                            : 0.0;
   }
   summary.unchecked += CountOf(static_cast<uint8_t>(Rung::kUnchecked),
                                std::span(field.model.pixels).subspan(first, count));

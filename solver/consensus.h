@@ -41,9 +41,4 @@ inline constexpr float kUncertaintyOfTurn = 0.4F;
 // light, some lobe) some 0.05.
 inline constexpr double kGlossInAlbedo = 0.05;
 
-// What a cloth differs by from the lobe it is given: half a degree.
-inline constexpr double kLobeUncertainty = 0.00872664626;
-// ... and of the albedo that part of the lobe itself.
-inline constexpr double kUncertaintyOfLobe = 0.1;
-
 }  // namespace sateen

@@ -80,10 +80,9 @@ HWY_INLINE void SolveVector(const KernelParams& params, const KernelInput& input
     StoreUnsolved(offset, output);
     return;
   }
-  const V x_mm = kDistant ? hn::Zero(d) : hn::LoadU(d, input.x_mm + offset);
-  const V y_mm = kDistant ? hn::Zero(d) : hn::LoadU(d, input.y_mm + offset);
+  const Vector3 x_mm = PointsAt<kDistant>(input, offset);
   Scale scale{one, one, NoLanes()};
-  const Gathered gathered = GatherScaled<kDistant>(params, input, offset, x_mm, y_mm, scale, state);
+  const Gathered gathered = GatherScaled<kDistant>(params, input, offset, x_mm, scale, state);
   float* scratch = state.scratch.get();
   const V threshold = hn::Mul(gathered.brightest, hn::Set(d, params.shadow_level));
   Answer answer;
@@ -177,9 +176,8 @@ void SolveConsensusSpanImpl(const KernelParams& params, const KernelInput& input
       params, input, output,
       [&](const KernelInput& in, size_t offset, const KernelOutput& out) HWY_ATTR {
         Scale scale{hn::Set(D(), 1.0F), hn::Set(D(), 1.0F), NoLanes()};
-        const V x_mm = hn::LoadU(D(), in.x_mm + offset);
-        const V y_mm = hn::LoadU(D(), in.y_mm + offset);
-        const Gathered gathered = GatherScaled<false>(params, in, offset, x_mm, y_mm, scale, state);
+        const Gathered gathered =
+            GatherScaled<false>(params, in, offset, PointsAt<false>(in, offset), scale, state);
         ConsensusVector(params, gathered, scale, state.scratch.get(), ranks.get(), offset, out);
       });
 }

@@ -39,6 +39,7 @@ struct KernelInput {
   const float* const* planes = nullptr;
   const float* x_mm = nullptr;  // table positions; null when every light is distant
   const float* y_mm = nullptr;
+  const float* z_mm = nullptr;  // heights above the table; null: 0
   // K pointers to 1 / g of each light's field, null for a light without; null when no light has one.
   const float* const* inverse_gains = nullptr;
   const uint8_t* mask = nullptr;  // 0 outside; null: all inside

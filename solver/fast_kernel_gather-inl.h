@@ -29,16 +29,29 @@ constexpr size_t kPrefetchAhead = 48;
 
 // ---- Pass 1: lights and samples ----------------------------------------------------------------
 
-// l and the factor that divides the irradiance's geometry out, at table position (x, y, 0).
+// The points that the pixels of a vector see.
+template <bool kDistant>
+HWY_INLINE Vector3 PointsAt(const KernelInput& input, size_t offset) {
+  const D d;
+  const V zero = hn::Zero(d);
+  if constexpr (kDistant) {
+    return {zero, zero, zero};
+  }
+  return {hn::LoadU(d, input.x_mm + offset), hn::LoadU(d, input.y_mm + offset),
+          input.z_mm == nullptr ? zero : hn::LoadU(d, input.z_mm + offset)};
+}
+
+// l and the factor that divides the irradiance's geometry out, at x.
 struct Incoming {
   Vector3 l;
   V inverse_gain;  // 0 behind an LED
 };
 
-HWY_INLINE Incoming IncomingAt(const KernelLight& light, V x_mm, V y_mm) {
+HWY_INLINE Incoming IncomingAt(const KernelLight& light, const Vector3& x_mm) {
   const D d;
-  const Vector3 to_light{hn::Sub(hn::Set(d, light.place[0]), x_mm),
-                         hn::Sub(hn::Set(d, light.place[1]), y_mm), hn::Set(d, light.place[2])};
+  const Vector3 to_light{hn::Sub(hn::Set(d, light.place[0]), x_mm.x),
+                         hn::Sub(hn::Set(d, light.place[1]), x_mm.y),
+                         hn::Sub(hn::Set(d, light.place[2]), x_mm.z)};
   const V squared = Dot(to_light, to_light);
   const V inverse = ReciprocalRootOf(squared);
   Incoming in{
@@ -74,7 +87,7 @@ struct Gathered {
 // Fills the scratch; luminance is -1 for samples that are saturated or not numbers.
 template <bool kDistant, bool kScaled>
 HWY_INLINE Gathered Gather(const KernelParams& params, const KernelInput& input, size_t offset,
-                           V x_mm, V y_mm, const Scale& scale, float* HWY_RESTRICT scratch) {
+                           const Vector3& x_mm, const Scale& scale, float* HWY_RESTRICT scratch) {
   const D d;
   const size_t lanes = hn::Lanes(d);
   const V zero = hn::Zero(d);
@@ -109,7 +122,7 @@ HWY_INLINE Gathered Gather(const KernelParams& params, const KernelInput& input,
         in = {{hn::Set(d, light.place[0]), hn::Set(d, light.place[1]), hn::Set(d, light.place[2])},
               hn::Set(d, 1.0F)};
       } else {
-        in = IncomingAt(light, x_mm, y_mm);
+        in = IncomingAt(light, x_mm);
         if (light.model == LightModel::kLedField) {
           in.inverse_gain = hn::Mul(in.inverse_gain, hn::LoadU(d, input.inverse_gains[k] + offset));
         }
@@ -169,13 +182,13 @@ struct State {
 // Gathers, with `scale` such that no pixel over- or underflows.
 template <bool kDistant>
 HWY_INLINE Gathered GatherScaled(const KernelParams& params, const KernelInput& input,
-                                 size_t offset, V x_mm, V y_mm, Scale& scale, State& state) {
+                                 size_t offset, const Vector3& x_mm, Scale& scale, State& state) {
   const D d;
   const DI di;
   float* scratch = state.scratch.get();
   Gathered gathered;
   if (HWY_LIKELY(!state.expect_far_from_one)) {
-    gathered = Gather<kDistant, false>(params, input, offset, x_mm, y_mm, scale, scratch);
+    gathered = Gather<kDistant, false>(params, input, offset, x_mm, scale, scratch);
     const V raw = gathered.brightest_raw;
     const M near_one =
         hn::And(hn::Ge(raw, hn::Set(d, kTwoToMinus40)), hn::Le(raw, hn::Set(d, kTwoTo40)));
@@ -193,7 +206,7 @@ HWY_INLINE Gathered GatherScaled(const KernelParams& params, const KernelInput& 
     scale = ScaleFor(brightest_bits);
   }
   if (far || state.expect_far_from_one) {
-    gathered = Gather<kDistant, true>(params, input, offset, x_mm, y_mm, scale, scratch);
+    gathered = Gather<kDistant, true>(params, input, offset, x_mm, scale, scratch);
   }
   state.expect_far_from_one = far;
   return gathered;

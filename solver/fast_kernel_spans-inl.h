@@ -66,7 +66,7 @@ HWY_INLINE void ForEachVector(const KernelParams& params, const KernelInput& inp
   }
   const size_t plane_count = 3 * params.lights.size();
   const size_t light_count = params.lights.size();
-  std::vector<float> padded((plane_count + 2 + light_count) * lanes, 0.0F);
+  std::vector<float> padded((plane_count + 3 + light_count) * lanes, 0.0F);
   std::vector<const float*> planes(plane_count);
   const auto pad = [&](size_t index, const float* from) {
     std::copy_n(from + whole, rest, padded.begin() + static_cast<std::ptrdiff_t>(index * lanes));
@@ -80,10 +80,13 @@ HWY_INLINE void ForEachVector(const KernelParams& params, const KernelInput& inp
     tail.x_mm = pad(plane_count, input.x_mm);
     tail.y_mm = pad(plane_count + 1, input.y_mm);
   }
+  if (input.z_mm != nullptr) {
+    tail.z_mm = pad(plane_count + 2, input.z_mm);
+  }
   std::vector<const float*> gains(light_count, nullptr);
   for (size_t k = 0; input.inverse_gains != nullptr && k < light_count; ++k) {
     if (input.inverse_gains[k] != nullptr) {
-      gains[k] = pad(plane_count + 2 + k, input.inverse_gains[k]);
+      gains[k] = pad(plane_count + 3 + k, input.inverse_gains[k]);
     }
   }
   tail.inverse_gains = gains.data();

@@ -13,8 +13,6 @@ namespace {
 
 constexpr int kPixelsPerPiece = 1 << 13;
 
-bool HasField(const Light& light) { return light.model == LightModel::kLedField; }
-
 KernelLight KernelLightOf(const Light& light, const LightFrame& frame, const SampleNoise& noise,
                           double flux_scale, const LambertianOptions& options) {
   const bool distant = light.model == LightModel::kDistant;
@@ -67,21 +65,11 @@ size_t BytesPerPixel(size_t light_count) {
 Result<FastRows> FastRows::Make(const LightStack& stack, const Rig& rig,
                                 const std::optional<Mask>& mask, const LambertianOptions& options,
                                 const StackNoise* noise) {
-  FastRows rows(stack, mask);
-  if (!AllDistant(rig.lights)) {
-    Result<TableGrid> grid = TableGrid::Make(*rig.camera);
-    if (!grid) {
-      return tl::unexpected(grid.error());
-    }
-    rows.grid_ = std::move(*grid);
+  Result<PixelLocator> locator = PixelLocator::Make(rig, options.height_mm);
+  if (!locator) {
+    return tl::unexpected(locator.error());
   }
-  if (std::ranges::any_of(rig.lights, HasField)) {
-    Result<GainRows> gains = GainRows::Make(*rig.camera, rig.lights);
-    if (!gains) {
-      return tl::unexpected(gains.error());
-    }
-    rows.gains_ = std::move(*gains);
-  }
+  FastRows rows(stack, mask, *std::move(locator));
   rows.params_.shadow_level = static_cast<float>(options.shadow_level);
   rows.params_.max_condition_squared = std::min(
       static_cast<float>(options.max_condition * options.max_condition), kFloatConditionSquared);
@@ -96,17 +84,7 @@ Result<FastRows> FastRows::Make(const LightStack& stack, const Rig& rig,
 
 PixelGeometry FastRows::GeometryOf(int begin, int end) const {
   PixelGeometry geometry;
-  if (grid_) {
-    const auto width = static_cast<size_t>((*stack_)[0].rgb[0].width);
-    geometry.x_mm.resize(width * static_cast<size_t>(end - begin));
-    geometry.y_mm.resize(geometry.x_mm.size());
-    for (int row = begin; row < end; ++row) {
-      const size_t start = width * static_cast<size_t>(row - begin);
-      grid_->Row(row, std::span(geometry.x_mm).subspan(start, width),
-                 std::span(geometry.y_mm).subspan(start, width));
-    }
-  }
-  FillGains(begin, end, geometry.gains, geometry.places);
+  locator_.Locate(begin, end, geometry);
   return geometry;
 }
 
@@ -117,27 +95,6 @@ void FastRows::Solve(int begin, int end, NormalField& field) const {
 void FastRows::SolveWeighted(int begin, int end, const PixelGeometry& geometry, double noise_scale,
                              NormalField& field, std::span<float> misfits) const {
   Run(SolveWeightedSpan, begin, end, geometry, field, misfits.data(), noise_scale);
-}
-
-void FastRows::FillGains(int begin, int end, std::vector<float>& gains,
-                         std::vector<const float*>& places) const {
-  if (!gains_) {
-    return;
-  }
-  const auto width = static_cast<size_t>((*stack_)[0].rgb[0].width);
-  const size_t pixels = width * static_cast<size_t>(end - begin);
-  places.assign(stack_->size(), nullptr);
-  gains.resize(pixels * places.size());
-  for (size_t k = 0; k < places.size(); ++k) {
-    if (!gains_->Has(k)) {
-      continue;
-    }
-    const std::span<float> of_light = std::span(gains).subspan(k * pixels, pixels);
-    for (int row = begin; row < end; ++row) {
-      gains_->Row(k, row, of_light.subspan(width * static_cast<size_t>(row - begin), width));
-    }
-    places[k] = of_light.data();
-  }
 }
 
 void FastRows::Touch(int begin, int end, NormalField& field) const {
@@ -159,6 +116,7 @@ void FastRows::Run(SpanFunction function, int begin, int end, const PixelGeometr
            {.planes = planes.data(),
             .x_mm = geometry.x_mm.empty() ? nullptr : geometry.x_mm.data(),
             .y_mm = geometry.y_mm.empty() ? nullptr : geometry.y_mm.data(),
+            .z_mm = geometry.z_mm.empty() ? nullptr : geometry.z_mm.data(),
             .inverse_gains = geometry.places.empty() ? nullptr : geometry.places.data(),
             .mask = *mask_ ? at(**mask_) : nullptr,
             .count = count,
@@ -188,6 +146,9 @@ void ListedPixels::Append(const PixelGeometry& geometry, size_t first,
   } else {
     append(geometry.x_mm.data(), x_mm);
     append(geometry.y_mm.data(), y_mm);
+  }
+  if (!geometry.z_mm.empty()) {
+    append(geometry.z_mm.data(), z_mm);
   }
   gains.resize(geometry.places.size());
   for (size_t k = 0; k < gains.size(); ++k) {
@@ -219,6 +180,7 @@ void FastRows::RunListed(SpanFunction function, const ListedPixels& listed, bool
            {.planes = planes.data(),
             .x_mm = has_positions ? listed.x_mm.data() : nullptr,
             .y_mm = has_positions ? listed.y_mm.data() : nullptr,
+            .z_mm = listed.z_mm.empty() ? nullptr : listed.z_mm.data(),
             .inverse_gains = gains.empty() ? nullptr : gains.data(),
             .count = count},
            output);
@@ -241,7 +203,7 @@ void FastRows::MisfitsAt(std::span<const size_t> pixels, std::span<float> misfit
   std::vector<float> results(9 * pixels.size());
   std::vector<uint8_t> models(pixels.size());
   const auto result = [&](size_t index) { return results.data() + index * pixels.size(); };
-  const bool has_positions = grid_.has_value();  // else the kernel for distant lights
+  const bool has_positions = locator_.HasPositions();  // else the kernel for distant lights
   RunListed(SolveWeightedSpan, listed, has_positions,
             {.normal = {result(0), result(1), result(2)},
              .albedo = {result(3), result(4), result(5)},

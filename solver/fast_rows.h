@@ -2,31 +2,24 @@
 
 #include <optional>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "core/error.h"
 #include "core/task.h"
-#include "rig/table_grid.h"
 #include "solver/fast_kernel.h"
-#include "solver/gain_rows.h"
 #include "solver/lambertian.h"
 #include "solver/noise.h"
+#include "solver/pixel_geometry.h"
 
 namespace sateen {
-
-// Table positions and gains of consecutive pixels, as far as the lights need them.
-struct PixelGeometry {
-  std::vector<float> x_mm;
-  std::vector<float> y_mm;
-  std::vector<float> gains;
-  std::vector<const float*> places;  // of each light's gains, or null
-};
 
 // Pixels anywhere in a stack, side by side with their geometry, so that every lane of a vector has work.
 struct ListedPixels {
   std::vector<size_t> pixels;
   std::vector<float> x_mm;  // zero where all lights are distant
   std::vector<float> y_mm;
+  std::vector<float> z_mm;                // empty where the surface is the table plane
   std::vector<std::vector<float>> gains;  // of each light; empty without a field
 
   // Appends pixels whose geometry starts with pixel `first`.
@@ -65,21 +58,17 @@ class FastRows {
  private:
   using SpanFunction = void (*)(const KernelParams&, const KernelInput&, const KernelOutput&);
 
-  FastRows(const LightStack& stack, const std::optional<Mask>& mask)
-      : stack_(&stack), mask_(&mask) {}
+  FastRows(const LightStack& stack, const std::optional<Mask>& mask, PixelLocator locator)
+      : stack_(&stack), mask_(&mask), locator_(std::move(locator)) {}
   void Run(SpanFunction function, int begin, int end, const PixelGeometry& geometry,
            NormalField& field, float* misfits, double noise_scale = 1.0) const;
   // Runs `function` over listed pixels.
   void RunListed(SpanFunction function, const ListedPixels& listed, bool has_positions,
                  const KernelOutput& output) const;
-  // 1 / g of rows [begin, end) for each light that has a field: `gains` holds them, `places` where.
-  void FillGains(int begin, int end, std::vector<float>& gains,
-                 std::vector<const float*>& places) const;
 
   const LightStack* stack_;
   const std::optional<Mask>* mask_;
-  std::optional<TableGrid> grid_;  // absent where all lights are distant
-  std::optional<GainRows> gains_;  // absent where no light has a field
+  PixelLocator locator_;
   KernelParams params_;
 };
 

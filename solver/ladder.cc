@@ -204,7 +204,7 @@ Status SolveLadderInto(const LightStack& stack, const Rig& rig, const std::optio
   }
   const ImageSize size = stack[0].rgb.Size();
   field.Resize(size);
-  if (field.model.Size() != size) {
+  if (field.model.Size() != size || field.albedo_uncertainty.Size() != size) {
     field.uncertainty = Image<float>(size);
     field.albedo_uncertainty = Image<float>(size);
     field.model = Image<uint8_t>(size);
@@ -214,7 +214,7 @@ Status SolveLadderInto(const LightStack& stack, const Rig& rig, const std::optio
   const NoiseScale scale = FindNoiseScale(stack, mask, *rows, known);
   Climb climb = MakeClimb(stack, rig, options, *rows, noise, scale.scale_squared);
   if (options.mode == LadderMode::kAuto) {
-    climb.lobe = FindLobe(stack, rig, options.least_squares, noise, scale.sample, climb.limit,
+    climb.lobe = FindLobe(stack, rig, options.least_squares, noise, scale.scale_squared, scale.sample, climb.limit,
                           task.ThreadCount());
   }
   PieceSummary total;

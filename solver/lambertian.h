@@ -51,7 +51,13 @@ struct LambertianOptions {
   // singular value of the l_k) is above this. kFast goes by an upper bound, up to three times too
   // large, and refuses above about 14 in any case. In [2, 1e6].
   double max_condition = 1000.0;
+  // Height of each pixel's point above the table plane, in millimetres, as solver/height.h finds it; finite,
+  // and below the camera and near lights. Borrowed, of the stack's size; null: 0.
+  const Image<float>* height_mm = nullptr;
 
+  [[nodiscard]] double HeightAt(int column, int row) const {
+    return height_mm == nullptr ? 0.0 : static_cast<double>(height_mm->At(column, row));
+  }
   // Names the first field out of range, with its value and its range.
   [[nodiscard]] Status Validate() const;
 };
@@ -126,7 +132,7 @@ struct NormalField {
 ///     n = N / |N|,  rho_c = |N_c|,  residual = sqrt(sum_k w_k (i'_k - N . l_k)^2 / sum_k w_k) (4)
 ///
 /// where l_k(x) and e_k(x) are IncidentAt(light k, x) of rig/light.h at the point x in which the
-/// pixel's ray meets the table plane z = 0, and w_k = 1 where sample k is usable, else 0: finite,
+/// pixel's ray meets the table plane z = 0, or its height_mm, and w_k = 1 where sample k is usable, else 0: finite,
 /// not saturated, not in shadow (LambertianOptions). Four systems a pixel with one matrix.
 ///
 /// stack    K frames, H x W
@@ -134,7 +140,7 @@ struct NormalField {
 /// mask     H x W or nothing: all pixels count
 /// Returns  H x W; unsolved pixels are zero in every map and have a reason
 /// Errors   kInvalidArgument: option out of range
-///          kBadData: stack, rig or mask disagree in count or size; a light out of range
+///          kBadData: stack, rig, mask or heights disagree in count or size; a light or height out of range
 ///          kDegenerate: fewer than three lights; all lights distant and in one plane
 ///          kCancelled
 /// Cost     O(H W K), no allocation per pixel in kFast; the same bits for any number of threads

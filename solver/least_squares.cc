@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "solver/fast_kernel.h"
+#include "solver/pixel_geometry.h"
 #include "solver/pixel_system.h"
 #include "solver/plain_ladder.h"
 #include "solver/reference_backends.h"
@@ -68,7 +69,9 @@ Status CheckInputs(const LightStack& stack, const Rig& rig, const std::optional<
   if (Status status = CheckStack(stack, mask); !status) {
     return status;
   }
-  if (Status status = rig.Validate("rig"); !status) {
+  if (Status status = rig.Validate("rig").and_then(
+          [&] { return CheckHeight(options.height_mm, rig, stack[0].rgb.Size()); });
+      !status) {
     return status;
   }
   if (AllDistant(rig.lights)) {

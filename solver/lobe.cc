@@ -144,17 +144,18 @@ Eigen::Vector3d MirrorOfBrightest(const LobeSamples& samples, const LobeShape& s
   return std::max(body, kLeastBody * cosines.dot(samples.i.col(3)) / squares) * unit;
 }
 
-// From the first of three starts that ends within the limit, or the best.
+// From the first of three starts that ends within the limit under one of the shapes, or the best of all.
 LobeFit FitLobe(const LobeSamples& samples, std::span<const LobeShape> shapes) {
   const double limit = samples.limit * static_cast<double>(samples.l.rows() - 3);
   LobeFit fit;
   for (const auto& start : {LeastSquares, DarkerHalf, MirrorOfBrightest}) {
+    if (fit.at.chi_squared <= limit) {
+      break;
+    }
     for (const LobeShape& shape : shapes) {
-      if (!(fit.at.chi_squared <= limit)) {
-        const LobeFit other = FitFrom(start(samples, shape), samples, shape);
-        if (other.at.chi_squared < fit.at.chi_squared) {
-          fit = other;
-        }
+      const LobeFit other = FitFrom(start(samples, shape), samples, shape);
+      if (other.at.chi_squared < fit.at.chi_squared) {
+        fit = other;
       }
     }
   }
@@ -178,11 +179,12 @@ LobeSamples::LobeSamples(Eigen::MatrixX3d directions, Eigen::MatrixX4d samples,
 }
 
 LobeSamples LobeSamplesOf(const PixelSystem& system, const StackNoise& noise,
-                          const Eigen::Vector3d& v, double limit) {
+                          double scale_squared, const Eigen::Vector3d& v, double limit) {
   const Eigen::MatrixX3d l = system.L();
   const Eigen::Matrix<double, 3, 4> n0 =
       (l.transpose() * l).ldlt().solve(l.transpose() * system.Rhs());
-  return {l, system.Rhs(), LuminanceWeightsOf(system, noise, n0), v, limit};
+  return {l, system.Rhs(), LuminanceWeightsOf(system, noise, n0) / scale_squared, v,
+          limit / scale_squared};
 }
 
 LobeAnswer SolveLobe(const LobeSamples& samples, const Lobe& lobe) {
@@ -198,8 +200,8 @@ LobeAnswer SolveLobe(const LobeSamples& samples, const Lobe& lobe) {
       FitLobe(samples, std::span(shapes).first(lobe.model == LobeModel::kGgxAnisotropic ? 2 : 1));
   LobeAnswer answer;
   const double length = fit.n.norm();
-  if (!std::isfinite(fit.at.chi_squared) || !(length > 0.0)) {
-    return answer;
+  if (!std::isfinite(fit.at.chi_squared) || !(fit.n.dot(samples.v) > 0.0)) {
+    return answer;  // also where the surface would be turned away
   }
   answer.n = fit.n;
   const Eigen::Vector3d unit = fit.n / length;
@@ -218,6 +220,12 @@ LobeAnswer SolveLobe(const LobeSamples& samples, const Lobe& lobe) {
       std::sqrt(std::max(0.0, covariance.trace() - along)) / length * kDegPerRad;
   answer.albedo_uncertainty = std::sqrt(std::max(0.0, along)) / length;
   return answer;
+}
+
+double LobeProbability(double misfit_without, double misfit_with, int freedom, double share) {
+  const double lead = 0.5 * freedom * (misfit_without - misfit_with) +
+                      std::log(share / (1.0 - std::min(share, 1.0 - kLeastShare)));
+  return 1.0 / (1.0 + std::exp(std::clamp(-lead, -700.0, 700.0)));
 }
 
 std::optional<Eigen::Vector3d> ViewOf(const Rig& rig, int column, int row) {

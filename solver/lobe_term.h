@@ -17,11 +17,13 @@ enum class LobeModel {
 // Rung 3 of solver/ladder.h: what a whole scene reflects at its surface, over a Lambertian body.
 struct Lobe {
   LobeModel model = LobeModel::kCloth;
-  double alpha = 0.0;        // roughness; of yarns, across their fibres
-  double strength = 0.0;     // times the model with F0 = 0.04
-  double alpha_along = 0.0;  // kGgxAnisotropic: along their fibres
-  double azimuth_deg =
-      0.0;  // ... and from x to where `alpha` counts, on the table; warp or weft, [0, 180)
+  double alpha = 0.0;     // roughness; of yarns, across their fibres
+  double strength = 0.0;  // times the model with F0 = 0.04
+  // Of kGgxAnisotropic: roughness along the fibres, and from x to where `alpha` counts, on the table, of warp
+  // or weft, [0, 180).
+  double alpha_along = 0.0;
+  double azimuth_deg = 0.0;
+  double share = 1.0;  // of the pixels that have it
 };
 
 // Half vector of l and v, and Schlick's share of a dielectric of F0 = 0.04 there: what does not depend on n.

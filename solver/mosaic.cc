@@ -35,14 +35,15 @@ double SecondsFrom(Clock::time_point start) {
 void ResizeMaps(ImageSize size, bool with_ladder, NormalField& field) {
   field.Resize(size);
   const ImageSize ladder_size = with_ladder ? size : ImageSize{};
-  if (field.model.Size() != ladder_size) {
+  if (field.model.Size() != ladder_size || field.albedo_uncertainty.Size() != ladder_size) {
     field.uncertainty = Image<float>(ladder_size);
     field.albedo_uncertainty = Image<float>(ladder_size);
     field.model = Image<uint8_t>(ladder_size);
   }
 }
 
-Status CheckMosaics(const MosaicStack& stack, const Rig& rig, const std::optional<Mask>& mask) {
+Status CheckMosaics(const MosaicStack& stack, const Rig& rig, const std::optional<Mask>& mask,
+                    const LambertianOptions& options) {
   const ImageSize size = stack.size_px;
   if (stack.lit.size() != rig.lights.size()) {
     return Fail(ErrorCode::kBadData, "{} frames but {} lights; need one light a frame",
@@ -60,7 +61,9 @@ Status CheckMosaics(const MosaicStack& stack, const Rig& rig, const std::optiona
     return Fail(ErrorCode::kBadData, "the mask is {}x{} px but the frames are {}x{} px",
                 mask->width, mask->height, size.width, size.height);
   }
-  if (Status status = rig.Validate("rig"); !status || AllDistant(rig.lights)) {
+  if (Status status =
+          rig.Validate("rig").and_then([&] { return CheckHeight(options.height_mm, rig, size); });
+      !status || AllDistant(rig.lights)) {
     return status;
   }
   if (rig.camera->size_px != size) {
@@ -152,7 +155,9 @@ class Probe {
       job_.feed.Read(row, row + 1, piece);
       for (int j = 0; j < columns && piece.IsRead(); ++j) {
         // Of both colours of the row, one after the other.
-        const int column = (2 * j + 1) * job_.stack.size_px.width / (2 * columns) / 2 * 2 + j % 2;
+        const int column =
+            std::min(job_.stack.size_px.width - 1,
+                     (2 * j + 1) * job_.stack.size_px.width / (2 * columns) / 2 * 2 + j % 2);
         const bool is_inside = job_.mask == nullptr || job_.mask->At(column, row) != 0;
         const std::optional<Eigen::Vector3d> v =
             is_inside ? ViewOf(job_.rig, column, row) : std::nullopt;
@@ -262,8 +267,8 @@ Result<SolveSummary> SolveBandsBy(const MosaicStack& stack, const Rig& rig,
                                   const Task& task,
                                   const std::function<Status(BandSolver&)>& solve_bands) {
   const Clock::time_point start = Clock::now();
-  if (const Status status =
-          options.Validate().and_then([&] { return CheckMosaics(stack, rig, mask); });
+  if (const Status status = options.Validate().and_then(
+          [&] { return CheckMosaics(stack, rig, mask, options.least_squares); });
       !status) {
     return tl::unexpected(status.error());
   }

@@ -74,8 +74,9 @@ MosaicFeed::Consensus MosaicFeed::Search(const MosaicPiece& piece, std::span<con
   const size_t frames = stack_->lit.size();
   const auto width = static_cast<size_t>(stack_->size_px.width);
   const size_t colours = coloured ? 3 : 1;
+  const PixelGeometry& geometry = piece.geometry_;
   // Side by side, so that every lane of a vector has work.
-  std::vector<float> gathered(((colours + 1) * frames + 2) * count, 0.0F);
+  std::vector<float> gathered(((colours + 1) * frames + 3) * count, 0.0F);
   size_t next = 0;
   const auto column = [&](const auto& value) {
     float* const to = gathered.data() + next;
@@ -96,12 +97,16 @@ MosaicFeed::Consensus MosaicFeed::Search(const MosaicPiece& piece, std::span<con
       }));
     }
     planes.insert(planes.end(), 3 - colours, planes.back());
-    if (!piece.gain_places_.empty() && piece.gain_places_[k] != nullptr) {
-      gains[k] = column([&](size_t at) { return piece.gain_places_[k][at]; });
+    if (!geometry.places.empty() && geometry.places[k] != nullptr) {
+      gains[k] = column([&](size_t at) { return geometry.places[k][at]; });
     }
   }
-  const float* const x_mm = column([&](size_t at) { return grid_ ? piece.x_mm_[at] : 0.0F; });
-  const float* const y_mm = column([&](size_t at) { return grid_ ? piece.y_mm_[at] : 0.0F; });
+  const auto coordinate = [&](const std::vector<float>& of_piece) {
+    return column([&](size_t at) { return of_piece.empty() ? 0.0F : of_piece[at]; });
+  };
+  const float* const x_mm = coordinate(geometry.x_mm);
+  const float* const y_mm = coordinate(geometry.y_mm);
+  const float* const z_mm = coordinate(geometry.z_mm);
   Consensus found{.results = std::vector<float>(9 * count),
                   .bytes = std::vector<uint8_t>(3 * count),
                   .count = count};
@@ -109,6 +114,7 @@ MosaicFeed::Consensus MosaicFeed::Search(const MosaicPiece& piece, std::span<con
                      {.planes = planes.data(),
                       .x_mm = x_mm,
                       .y_mm = y_mm,
+                      .z_mm = z_mm,
                       .inverse_gains = gains.data(),
                       .count = count},
                      {.normal = {found.Result(0), found.Result(1), found.Result(2)},

@@ -68,22 +68,11 @@ void SiteRows::Begin(int begin, int end, NormalField& field, int field_row, bool
 
 Result<MosaicFeed> MosaicFeed::Make(const MosaicStack& stack, const Rig& rig,
                                     const LambertianOptions& options, bool weighted) {
-  MosaicFeed feed(stack);
-  if (!AllDistant(rig.lights)) {
-    Result<TableGrid> grid = TableGrid::Make(*rig.camera);
-    if (!grid) {
-      return tl::unexpected(grid.error());
-    }
-    feed.grid_ = *std::move(grid);
+  Result<PixelLocator> locator = PixelLocator::Make(rig, options.height_mm);
+  if (!locator) {
+    return tl::unexpected(locator.error());
   }
-  if (std::ranges::any_of(
-          rig.lights, [](const Light& light) { return light.model == LightModel::kLedField; })) {
-    Result<GainRows> gains = GainRows::Make(*rig.camera, rig.lights);
-    if (!gains) {
-      return tl::unexpected(gains.error());
-    }
-    feed.gains_ = *std::move(gains);
-  }
+  MosaicFeed feed(stack, *std::move(locator));
   const double flux_scale = FluxScale(rig.lights);
   const double noise_unit = weighted ? NoiseUnit(stack, rig.lights[0], flux_scale) : 1.0;
   feed.params_.result_scale = static_cast<float>(1.0 / flux_scale);
@@ -160,7 +149,7 @@ void MosaicFeed::Read(int begin, int end, MosaicPiece& piece) const {
     piece.readings_.push_back(rows.data());
   }
   ReadDark(piece);
-  Locate(piece);
+  locator_.Locate(begin, end, piece.geometry_);
 }
 
 void MosaicFeed::ReadDark(MosaicPiece& piece) const {
@@ -192,50 +181,19 @@ void MosaicFeed::ReadDark(MosaicPiece& piece) const {
   }
 }
 
-// Table positions and gains, as far as the lights need them.
-void MosaicFeed::Locate(MosaicPiece& piece) const {
-  const auto width = static_cast<size_t>(stack_->size_px.width);
-  const size_t sites = width * static_cast<size_t>(piece.end_ - piece.begin_);
-  const auto each_row = [&](const auto& body) {
-    for (int row = piece.begin_; row < piece.end_; ++row) {
-      body(row, width * static_cast<size_t>(row - piece.begin_));
-    }
-  };
-  if (grid_) {
-    piece.x_mm_.resize(sites);
-    piece.y_mm_.resize(sites);
-    each_row([&](int row, size_t start) {
-      grid_->Row(row, std::span(piece.x_mm_).subspan(start, width),
-                 std::span(piece.y_mm_).subspan(start, width));
-    });
-  }
-  if (gains_) {
-    const size_t frames = stack_->lit.size();
-    piece.gains_.resize(sites * frames);
-    piece.gain_places_.assign(frames, nullptr);
-    for (size_t k = 0; k < frames; ++k) {
-      if (gains_->Has(k)) {
-        const std::span<float> of_light = std::span(piece.gains_).subspan(k * sites, sites);
-        each_row(
-            [&](int row, size_t start) { gains_->Row(k, row, of_light.subspan(start, width)); });
-        piece.gain_places_[k] = of_light.data();
-      }
-    }
-  }
-}
-
 void MosaicFeed::Run(RowFunction function, const MosaicPiece& piece, const Mask* mask,
                      SiteRows& rows) const {
   const auto width = static_cast<size_t>(stack_->size_px.width);
   std::vector<const uint16_t*> readings(piece.readings_.size());
-  std::vector<const float*> gains(piece.gain_places_.size());
+  const PixelGeometry& geometry = piece.geometry_;
+  std::vector<const float*> gains(geometry.places.size());
   for (int row = piece.begin_; row < piece.end_; ++row) {
     const size_t start = width * static_cast<size_t>(row - piece.begin_);
     const size_t to = rows.Index(row);
     NormalField& field = rows.Field();
     std::ranges::transform(piece.readings_, readings.begin(),
                            [&](const uint16_t* frame) { return frame + piece.beyond_ + start; });
-    std::ranges::transform(piece.gain_places_, gains.begin(), [&](const float* of_light) {
+    std::ranges::transform(geometry.places, gains.begin(), [&](const float* of_light) {
       return of_light == nullptr ? nullptr : of_light + start;
     });
     const auto at = [&](auto& image) { return image.pixels.data() + to; };
@@ -245,8 +203,9 @@ void MosaicFeed::Run(RowFunction function, const MosaicPiece& piece, const Mask*
     function(params_,
              {.readings = readings.data(),
               .dark = piece.dark_.empty() ? nullptr : piece.dark_.data() + piece.beyond_ + start,
-              .x_mm = from(piece.x_mm_),
-              .y_mm = from(piece.y_mm_),
+              .x_mm = from(geometry.x_mm),
+              .y_mm = from(geometry.y_mm),
+              .z_mm = from(geometry.z_mm),
               .inverse_gains = gains.empty() ? nullptr : gains.data(),
               .mask = mask == nullptr ? nullptr : mask->pixels.data() + mask->Index(0, row),
               .row = row,

@@ -3,15 +3,15 @@
 #include <mutex>
 #include <optional>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "core/error.h"
 #include "imaging/mosaic_stack.h"
-#include "rig/table_grid.h"
 #include "solver/fast_kernel.h"
-#include "solver/gain_rows.h"
 #include "solver/lambertian.h"
 #include "solver/mosaic_kernel.h"
+#include "solver/pixel_geometry.h"
 
 namespace sateen {
 
@@ -62,10 +62,7 @@ class MosaicPiece {
   std::vector<std::vector<uint16_t>> buffers_;
   std::vector<const uint16_t*> readings_;  // of each lit frame
   std::vector<float> dark_;
-  std::vector<float> x_mm_;
-  std::vector<float> y_mm_;
-  std::vector<float> gains_;
-  std::vector<const float*> gain_places_;
+  PixelGeometry geometry_;
 };
 
 // Pieces that are not in use. Calls may come from any thread.
@@ -116,14 +113,13 @@ class MosaicFeed {
                                size_t colour) const;
   [[nodiscard]] Consensus Search(const MosaicPiece& piece, std::span<const size_t> sites,
                                  bool coloured) const;
-  explicit MosaicFeed(const MosaicStack& stack) : stack_(&stack) {}
+  MosaicFeed(const MosaicStack& stack, PixelLocator locator)
+      : stack_(&stack), locator_(std::move(locator)) {}
   void ReadDark(MosaicPiece& piece) const;
-  void Locate(MosaicPiece& piece) const;
   void Run(RowFunction function, const MosaicPiece& piece, const Mask* mask, SiteRows& rows) const;
 
   const MosaicStack* stack_;
-  std::optional<TableGrid> grid_;  // absent where all lights are distant
-  std::optional<GainRows> gains_;  // absent where no light has a field
+  PixelLocator locator_;
   MosaicKernelParams params_;
   KernelParams consensus_;
 };

@@ -83,8 +83,10 @@ HWY_INLINE Arrival ArrivalOf(const MosaicKernelLight& light, const MosaicKernelI
   if (kDistant || light.model == LightModel::kDistant) {
     return {place, hn::Set(d, 1.0F)};
   }
-  const Vector3 to_light{hn::Sub(place.x, hn::LoadU(d, input.x_mm + offset)),
-                         hn::Sub(place.y, hn::LoadU(d, input.y_mm + offset)), place.z};
+  const Vector3 to_light{
+      hn::Sub(place.x, hn::LoadU(d, input.x_mm + offset)),
+      hn::Sub(place.y, hn::LoadU(d, input.y_mm + offset)),
+      input.z_mm == nullptr ? place.z : hn::Sub(place.z, hn::LoadU(d, input.z_mm + offset))};
   const V squared = Dot(to_light, to_light);
   const V inverse = ReciprocalRootOf(squared);
   Arrival in{

@@ -45,9 +45,9 @@ int64_t SolveInDouble(const MosaicJob& job, const MosaicPiece& piece, bool all, 
       field.samples.pixels[p] = static_cast<uint8_t>(std::min(solution.samples, 255));
       field.reason.pixels[p] = static_cast<uint8_t>(solution.reason);
       if (job.options.mode) {
-        field.uncertainty.pixels[p] = static_cast<float>(std::min(solution.uncertainty_deg, 180.0));
+        field.uncertainty.pixels[p] = static_cast<float>(std::min(180.0, solution.uncertainty_deg));
         field.albedo_uncertainty.pixels[p] =
-            static_cast<float>(std::min(solution.albedo_uncertainty, 1.0));
+            static_cast<float>(std::min(1.0, solution.albedo_uncertainty));
         rows.Misfit(p) = static_cast<float>(solution.misfit);
       }
       ++solved;
@@ -88,16 +88,15 @@ void SolveSitesUnderLobe(const MosaicJob& job, const MosaicPiece& piece, SiteRow
       if (answer.n.isZero() || !(answer.misfit <= samples->limit)) {
         continue;
       }
-      const Eigen::Vector3d n = answer.n.normalized();
-      for (size_t c = 0; c < 3; ++c) {
-        field.normal[c].pixels[p] = static_cast<float>(n[static_cast<Eigen::Index>(c)]);
+      const auto albedo = static_cast<float>(answer.albedo[0]);
+      const Estimate of_rung_1 = EstimatesAt(field, std::span(&p, 1), [&](size_t site_at) {
+                                   return rows.OwnColour(site_at);
+                                 }).front();
+      if (TakesLobe(answer, albedo, job.lobe->share, static_cast<double>(rows.Misfit(p)), of_rung_1,
+                    field, p)) {
+        rows.OwnColour(p) = albedo;
+        ++summary.lobe;
       }
-      rows.OwnColour(p) = static_cast<float>(answer.albedo[0]);
-      field.residual.pixels[p] = static_cast<float>(answer.residual);
-      StoreLobeUncertainty(answer, 1.0, field, p);
-      field.model.pixels[p] = static_cast<uint8_t>(Rung::kLobe);
-      summary.lobe_deg += static_cast<double>(field.uncertainty.pixels[p]);
-      ++summary.lobe;
     }
   }
 }
@@ -116,12 +115,16 @@ void ClimbSites(const MosaicJob& job, const MosaicPiece& piece, SiteRows& rows,
   if (job.lobe) {
     summary.lobe_seconds += SecondsOf([&] { SolveSitesUnderLobe(job, piece, rows, summary); });
   }
+  for (int row = piece.Begin(); job.light_doubt && row < piece.End(); ++row) {
+    job.light_doubt->AddToRow(row, rows.Index(row), field);
+  }
   for (size_t p = begin; p < end; ++p) {
     if (!IsSolved(field, p)) {
       field.uncertainty.pixels[p] = field.albedo_uncertainty.pixels[p] = 0.0F;
       continue;
     }
     if (field.model.pixels[p] == static_cast<uint8_t>(Rung::kLobe)) {
+      summary.lobe_deg += static_cast<double>(field.uncertainty.pixels[p]);
       continue;
     }
     const Rung rung = field.samples.pixels[p] <= 3 ? Rung::kUnchecked : Rung::kLeastSquares;
@@ -181,9 +184,6 @@ bool SolvePiece(const MosaicJob& job, int begin, int end, SiteRows& rows, PieceS
       (backend == Backend::kAuto && CountSitesOf(Reason::kIllConditioned, piece, rows) > 0)) {
     const int64_t solved = SolveInDouble(job, piece, in_double, rows);
     summary.counts.resolved_by_reference += in_double ? 0 : solved;
-  }
-  for (int row = begin; job.options.mode && job.light_doubt && row < end; ++row) {
-    job.light_doubt->AddToRow(row, rows.Index(row), rows.Field());
   }
   if (job.options.mode) {
     ClimbSites(job, piece, rows, summary);

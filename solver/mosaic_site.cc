@@ -66,7 +66,8 @@ void MosaicSite::Gather(int column, int row, const std::vector<uint16_t>& readin
                         SiteSolution& solution) {
   const size_t site = static_cast<size_t>(row % 2 * 2 + column % 2);
   const std::optional<Eigen::Vector3d> x_mm =
-      needs_position_ ? TablePointOfPixel(*rig_.camera, column, row) : Eigen::Vector3d::Zero();
+      needs_position_ ? TablePointOfPixel(*rig_.camera, column, row, options_.HeightAt(column, row))
+                      : Eigen::Vector3d::Zero();
   int unsaturated = 0;
   int saturated = 0;
   bool bright = false;
@@ -184,7 +185,7 @@ void MosaicSite::Weigh(size_t site, SiteSolution& solution) const {
   const double squared = solution.n.squaredNorm();
   const double along = solution.n.dot(c * solution.n) / squared;
   solution.uncertainty_deg = std::sqrt(std::max(0.0, c.trace() - along) / squared) * kDegPerRad;
-  solution.albedo_uncertainty = std::sqrt(along / squared);
+  solution.albedo_uncertainty = std::sqrt(std::max(0.0, along) / squared);
 }
 
 }  // namespace sateen

@@ -34,7 +34,7 @@ std::optional<Eigen::Vector3d> PixelSystem::TablePoint(int column, int row) cons
   if (!needs_position_) {
     return Eigen::Vector3d::Zero();
   }
-  return TablePointOfPixel(*rig_.camera, column, row);
+  return TablePointOfPixel(*rig_.camera, column, row, options_.HeightAt(column, row));
 }
 
 void PixelSystem::Gather(int column, int row) {

@@ -22,6 +22,19 @@ constexpr float kAnyNormalDeg = 60.0F;
 constexpr double kDoubtfulShare = 0.2;
 constexpr double kUndoubtedShare = 0.02;
 
+struct Difference {
+  double turned_deg;
+  double albedo;  // over that of the second, at most 1
+};
+
+Difference DifferenceOf(const Estimate& a, const Estimate& b) {
+  const double turned_deg = std::atan2(static_cast<double>(a.n.cross(b.n).norm()),
+                                       static_cast<double>(a.n.dot(b.n))) *
+                            kDegPerRad;
+  const double change = std::abs(static_cast<double>(a.albedo / b.albedo) - 1.0);
+  return {turned_deg, change <= 1.0 ? change : 1.0};
+}
+
 }  // namespace
 
 void PieceSummary::Add(const PieceSummary& other) {
@@ -67,13 +80,8 @@ void JudgeConsensus(std::span<const size_t> pixels, std::span<const Estimate> be
                     NormalField& field, PieceSummary& summary) {
   for (size_t j = 0; j < pixels.size(); ++j) {
     const bool is_explained = agreeing[j] >= kFewestAgreeing;
-    const double turned_deg = std::atan2(static_cast<double>(before[j].n.cross(after[j].n).norm()),
-                                         static_cast<double>(before[j].n.dot(after[j].n))) *
-                              kDegPerRad;
+    const auto [turned_deg, change] = DifferenceOf(before[j], after[j]);
     const auto albedo = static_cast<double>(after[j].albedo);
-    const double change =
-        albedo > 0.0 ? std::min(1.0, std::abs(static_cast<double>(before[j].albedo) / albedo - 1.0))
-                     : 1.0;
     const double rejected = 1.0 - static_cast<double>(agreeing[j]) /
                                       static_cast<double>(field.samples.pixels[pixels[j]]);
     const double factor =
@@ -126,13 +134,33 @@ Doubt DoubtOf(const PieceSummary& total) {
           doubt * std::hypot(kLeastModelUncertainty, change)};
 }
 
-void StoreLobeUncertainty(const LobeAnswer& answer, double noise_scale, NormalField& field,
-                          size_t pixel) {
-  field.uncertainty.pixels[pixel] = static_cast<float>(std::min(
-      180.0, std::hypot(answer.uncertainty_deg * noise_scale, kLobeUncertainty * kDegPerRad)));
-  field.albedo_uncertainty.pixels[pixel] = static_cast<float>(
-      std::min(1.0, std::hypot(answer.albedo_uncertainty * noise_scale, kLobeUncertainty,
-                               kUncertaintyOfLobe * answer.lobe_share)));
+bool TakesLobe(const LobeAnswer& answer, float albedo_of_lobe, double share,
+               double misfit_of_rung_1, const Estimate& of_rung_1, NormalField& field,
+               size_t pixel) {
+  const double likely = LobeProbability(misfit_of_rung_1, answer.misfit,
+                                        field.samples.pixels[pixel] - 3, share);
+  const bool takes = likely >= 0.5;
+  const Eigen::Vector3f n = answer.n.normalized().cast<float>();
+  float& uncertainty = field.uncertainty.pixels[pixel];
+  float& of_albedo = field.albedo_uncertainty.pixels[pixel];
+  if (takes) {
+    for (size_t c = 0; c < 3; ++c) {
+      field.normal[c].pixels[pixel] = n[static_cast<Eigen::Index>(c)];
+    }
+    field.residual.pixels[pixel] = static_cast<float>(answer.residual);
+    field.model.pixels[pixel] = static_cast<uint8_t>(Rung::kLobe);
+    uncertainty =
+        static_cast<float>(std::hypot(answer.uncertainty_deg, kLobeUncertainty * kDegPerRad));
+    of_albedo = static_cast<float>(std::hypot(answer.albedo_uncertainty, kLobeUncertainty,
+                                              kUncertaintyOfLobe * answer.lobe_share));
+  }
+  const double of_other = std::sqrt(takes ? 1.0 - likely : likely);
+  const Difference difference = DifferenceOf(of_rung_1, {n, albedo_of_lobe});
+  uncertainty = std::min(180.0F, std::hypot(uncertainty, static_cast<float>(
+                                                             of_other * difference.turned_deg)));
+  of_albedo =
+      std::min(1.0F, std::hypot(of_albedo, static_cast<float>(of_other * difference.albedo)));
+  return takes;
 }
 
 double SecondsOf(const std::function<void()>& work) {

@@ -73,10 +73,12 @@ struct Doubt {
 };
 [[nodiscard]] Doubt DoubtOf(const PieceSummary& total);
 
-// Of a pixel under a lobe: what noise does, `noise_scale` times what the answer says, and what a cloth
-// differs by from the lobe it is given.
-void StoreLobeUncertainty(const LobeAnswer& answer, double noise_scale, NormalField& field,
-                          size_t pixel);
+// Whether a solved pixel takes rung 3's answer, by the odds of what rung 1 (whose chi^2 over its degrees of
+// freedom, s^2 included, this is) and the lobe leave of its samples: then normal, residual, uncertainties and
+// rung are the lobe's. What the two differ by counts as much as the other is likely, in both uncertainties.
+[[nodiscard]] bool TakesLobe(const LobeAnswer& answer, float albedo_of_lobe, double share,
+                             double misfit_of_rung_1, const Estimate& of_rung_1,
+                             NormalField& field, size_t pixel);
 
 [[nodiscard]] double SecondsOf(const std::function<void()>& work);
 

@@ -266,5 +266,36 @@ TEST(Rig, CalibrationOfAValueMustBeAJsonObject) {
   EXPECT_THAT(rig.Validate("rig").error().message, HasSubstr("calibration is not a JSON object"));
 }
 
+// What a point of space sees, told from two table planes.
+TEST(Lifted, RigGivesEveryPointTheSameLightAndEveryPixelTheSameRay) {
+  const Rig rig = Read(FullRig().dump()).value();
+  constexpr double kHeightMm = 12.5;
+  const Rig lifted = Lifted(rig, kHeightMm).value();
+
+  for (const Eigen::Vector3d& x :
+       {Eigen::Vector3d(3.0, 4.0, 12.5), Eigen::Vector3d(-60.0, 20.0, 0.0),
+        Eigen::Vector3d(40.0, -70.0, 31.0)}) {
+    const Eigen::Vector3d from_lifted = x - Eigen::Vector3d(0.0, 0.0, kHeightMm);
+    for (size_t k = 0; k < rig.lights.size(); ++k) {
+      const Incident expected = IncidentAt(rig.lights[k], x);
+      const Incident found = IncidentAt(lifted.lights[k], from_lifted);
+      EXPECT_LT((found.l - expected.l).norm(), 1e-14) << rig.lights[k].name;
+      EXPECT_LT((found.e_rgb - expected.e_rgb).norm(), 1e-12 * expected.e_rgb.norm())
+          << rig.lights[k].name;
+    }
+  }
+  const Eigen::Vector3d expected = TablePointOfPixel(*rig.camera, 100.0, 3000.0, kHeightMm).value();
+  const Eigen::Vector3d found = TablePointOfPixel(*lifted.camera, 100.0, 3000.0).value();
+  EXPECT_LT((found + Eigen::Vector3d(0.0, 0.0, kHeightMm) - expected).norm(), 1e-9);
+}
+
+TEST(Lifted, RefusesASurfaceThatIsNotBelowLightsAndCamera) {
+  const Rig rig = Read(FullRig().dump()).value();
+  EXPECT_THAT(Lifted(rig, 350.25).error().message,
+              HasSubstr("the surface is at 350.25 mm, but lights[2] is at 350 mm"));
+  EXPECT_THAT(Lifted(rig, 500.0).error().message, HasSubstr("but the camera is at 500 mm"));
+  EXPECT_THAT(Lifted(rig, std::nan("")).error().message, HasSubstr("need a number"));
+}
+
 }  // namespace
 }  // namespace sateen
