@@ -7,6 +7,7 @@
 #include <cmath>
 #include <numbers>
 #include <random>
+#include <utility>
 
 #include "reflectance/specular.h"
 #include "tests/solver/ladder_cases.h"
@@ -161,6 +162,90 @@ TEST(Lobe, IsFoundAndTakenOutOfNormalAndAlbedo) {
     EXPECT_GT(inside, 3072 * 9 / 10) << Name(lobe.model);
     EXPECT_LT(unsure, 3072 / 10) << Name(lobe.model);
   }
+}
+
+// Root mean square of error over uncertainty, of normals and of albedo.
+std::pair<double, double> StandardisedErrors(const NormalField& field,
+                                             const RenderedRelief& truth) {
+  Image<float> angle;
+  EXPECT_TRUE(AngularErrorDeg(field, truth.normal, &angle));
+  const Image<float> albedo = AlbedoErrorMap(field, truth.albedo).value();
+  double of_angle = 0.0;
+  double of_albedo = 0.0;
+  for (size_t p = 0; p < angle.pixels.size(); ++p) {
+    of_angle += std::pow(static_cast<double>(angle.pixels[p] / field.uncertainty.pixels[p]), 2);
+    of_albedo +=
+        std::pow(static_cast<double>(albedo.pixels[p] / field.albedo_uncertainty.pixels[p]), 2);
+  }
+  const auto count = static_cast<double>(angle.pixels.size());
+  return {std::sqrt(of_angle / count), std::sqrt(of_albedo / count)};
+}
+
+// Noise that hides much of the lobe: pixels that have it and pixels that do not are told apart by odds, and
+// what is not sure is in the uncertainty.
+TEST(Lobe, BesideMatteClothEveryPixelSaysHowSureItIs) {
+  const Rig rig = RingRig(kLobeSize);
+  const Lobe lobe{.model = LobeModel::kGgx, .alpha = 0.3, .strength = 1.0};
+  for (const int share : {90, 100}) {
+    RenderedRelief rendered = Render(rig, kLobeSize, 20.0);
+    AddLobe(rig, lobe, share, 100000.0, rendered);
+    for (Image<float>& plane : rendered.albedo.planes) {
+      for (float& rho : plane.pixels) {
+        rho *= 0.03F;
+      }
+    }
+    const NormalField field =
+        MustSolve(rendered.stack, rig, WithShotNoise(100000.0, rig.lights.size()));
+    ASSERT_TRUE(field.summary.lobe) << share;
+    EXPECT_NEAR(field.summary.lobe->share, 0.01 * share, 0.1);
+    const auto [angle, albedo] = StandardisedErrors(field, rendered);
+    EXPECT_LT(angle, 1.3) << share;
+    EXPECT_GT(angle, 0.15) << share;
+    EXPECT_LT(albedo, 1.3) << share;
+  }
+}
+
+// Light from everywhere, a share of the lights' mean, looks like gloss that is rougher and stronger than any.
+TEST(Lobe, StrayLightIsNone) {
+  Rig rig = RingRig(kLobeSize);
+  for (size_t k = 0; k < rig.lights.size(); k += 2) {
+    rig.lights[k].position_mm.z() *= 0.5;  // one ring of lights does not tell it from a steeper normal
+  }
+  const double step = 0.1 / kElectrons;
+  for (const float stray : {0.2F, 0.4F}) {
+    RenderedRelief rendered = Render(rig, kLobeSize, 20.0);
+    std::mt19937 random(7);
+    for (size_t p = 0; p < kLobeSize.PixelCount(); ++p) {
+      for (size_t c = 0; c < 3; ++c) {
+        float mean = 0.0F;
+        for (const LightFrame& frame : rendered.stack) {
+          mean += frame.rgb[c].pixels[p] / static_cast<float>(rendered.stack.size());
+        }
+        for (LightFrame& frame : rendered.stack) {
+          float& i = frame.rgb[c].pixels[p];
+          std::poisson_distribution<int> count(static_cast<double>(i + stray * mean) / step);
+          i = static_cast<float>(count(random) * step);
+        }
+      }
+    }
+    const NormalField field =
+        MustSolve(rendered.stack, rig, WithShotNoise(kElectrons, rig.lights.size()));
+    EXPECT_FALSE(field.summary.lobe) << stray;
+    EXPECT_GT(field.summary.robust.pixels, 1000) << stray;  // so that one was looked for
+  }
+}
+
+TEST(Lobe, TheLightsDoubtIsInItsUncertainty) {
+  Rig rig = RingRig(kLobeSize);
+  RenderedRelief rendered = Render(rig, kLobeSize, 20.0);
+  AddLobe(rig, kGloss, 100, kElectrons, rendered);
+  for (Light& light : rig.lights) {
+    light.irradiance_sd = 0.05;
+  }
+  const NormalField field =
+      MustSolve(rendered.stack, rig, WithShotNoise(kElectrons, rig.lights.size()));
+  EXPECT_GT(field.summary.under_lobe.pixels, 3072 / 2);
+  EXPECT_GT(field.summary.under_lobe.mean_uncertainty_deg, 1.0);
 }
 
 TEST(Lobe, LambertianScenesHaveNone) {
