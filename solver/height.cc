@@ -44,9 +44,9 @@ int TransformSide(int side) {
 // Equation (4): pairs of neighbours that are both known, on a grid that the transform likes.
 class Membrane {
  public:
-  Membrane(ImageSize size, Task task)
+  Membrane(ImageSize size, const Task& task)
       : known_(TransformSide(size.width), TransformSide(size.height)),
-        task_(std::move(task)),
+        task_(task),
         waves_x_(WavesOf(known_.width)),
         waves_y_(WavesOf(known_.height)) {}
 

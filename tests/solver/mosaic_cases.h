@@ -86,7 +86,9 @@ struct Readings {
                                   int threads = 0, const std::optional<Mask>& mask = std::nullopt) {
     const MosaicsInMemory rows(frames);
     stack.rows = &rows;
-    return SolveMosaic(stack, rig, mask, options, {.threads = threads}).value();
+    NormalField field = SolveMosaic(stack, rig, mask, options, {.threads = threads}).value();
+    stack.rows = nullptr;
+    return field;
   }
 };
 
