@@ -41,8 +41,8 @@ class FastRows {
 
   // Solves rows [begin, end) into `field`; refused pixels are kIllConditioned.
   void Solve(int begin, int end, NormalField& field) const;
-  // With weights, for which there must be noise: also field.uncertainty, times noise_scale,
-  // field.model and the misfit of each pixel.
+  // With weights, for which there must be noise: also both uncertainties, times noise_scale, field.model
+  // and the misfit of each pixel.
   void SolveWeighted(int begin, int end, const PixelGeometry& geometry, double noise_scale,
                      NormalField& field, std::span<float> misfits) const;
   // Misfit, usable samples and reason of pixels anywhere, in order of their indices.

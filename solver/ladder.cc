@@ -214,8 +214,8 @@ Status SolveLadderInto(const LightStack& stack, const Rig& rig, const std::optio
   const NoiseScale scale = FindNoiseScale(stack, mask, *rows, known);
   Climb climb = MakeClimb(stack, rig, options, *rows, noise, scale.scale_squared);
   if (options.mode == LadderMode::kAuto) {
-    climb.lobe = FindLobe(stack, rig, options.least_squares, noise, scale.scale_squared, scale.sample, climb.limit,
-                          task.ThreadCount());
+    climb.lobe = FindLobe(stack, rig, options.least_squares, noise, scale.scale_squared,
+                          scale.sample, climb.limit, task.ThreadCount());
   }
   PieceSummary total;
   if (Status status = ClimbAllRows(climb, task, field, total); !status) {

@@ -81,7 +81,8 @@ struct LadderOptions {
 /// departure from grey has no part in them.
 /// (9) is the sum of logarithms: it prefers a normal that many samples agree with exactly, whatever
 /// the others do, which is what highlights and shadows need. A pixel in which fewer than four
-/// samples agree with N to 0.1 q is kUnexplained, three times as uncertain, at least 60 degrees where no N is left; one with three usable samples, which nothing can
+/// samples agree with N to 0.1 q is kUnexplained and three times as uncertain, at least 60 degrees where
+/// no N is left; one with three usable samples, which nothing can
 /// check, is kUnchecked. Where from 2 to 20 of 100 pixels take this rung, rung 1's uncertainty gets 0 to
 /// all of hypot(3 degrees, 0.4 t), t in the mean of those pixels; kUnchecked all of t.
 ///
@@ -92,10 +93,17 @@ struct LadderOptions {
 ///     a, alpha = argmin sum over some 400 pixels of log(1 + misfit / limit)                  (15)
 ///
 /// f is Cloth, Ggx or GgxAnisotropic of reflectance/specular.h with F0 = 0.04; of the last, which is
-/// tried where no other does, every pixel takes the better of two tangents at a right angle: warp or weft.
-/// It is looked for where rung 1 explains fewer than 80 of 100 pixels, and believed where (14)
-/// explains 70; then every pixel that it explains takes it, with the covariance (J^T W J)^-1 in (4), half a
-/// degree, and of the albedo a tenth of what the lobe reflects over it.
+/// tried where no other does, every pixel takes the better of two tangents at a right angle: warp or
+/// weft. It is looked for where rung 1 explains fewer than 80 of 100 pixels, and believed where (14)
+/// explains 70, halves what is unexplained and takes a fifth off (15) (solver/lobe_search.h). A pixel that
+/// it explains takes it where
+///
+///     share exp(-chi^2 / 2) > (1 - share) exp(-chi_1^2 / 2)                                   (17)
+///
+/// chi_1^2 rung 1's, `share` that of the pixels with the lobe. Uncertainties are (4) with the covariance
+/// (J^T W J)^-1, half a degree, and of the albedo a tenth of what the lobe reflects over it; what the two
+/// answers differ by, times the root of the probability of the other, is part of both rungs'. So is what
+/// uncertain lights do (solver/light_doubt.h).
 ///
 /// Where all frames are camera RAW, their colours are interpolated, and no rung sees what that does to
 /// the normals where they bend from pixel to pixel:

@@ -178,8 +178,8 @@ LobeSamples::LobeSamples(Eigen::MatrixX3d directions, Eigen::MatrixX4d samples,
   }
 }
 
-LobeSamples LobeSamplesOf(const PixelSystem& system, const StackNoise& noise,
-                          double scale_squared, const Eigen::Vector3d& v, double limit) {
+LobeSamples LobeSamplesOf(const PixelSystem& system, const StackNoise& noise, double scale_squared,
+                          const Eigen::Vector3d& v, double limit) {
   const Eigen::MatrixX3d l = system.L();
   const Eigen::Matrix<double, 3, 4> n0 =
       (l.transpose() * l).ldlt().solve(l.transpose() * system.Rhs());

@@ -80,7 +80,7 @@ Score ScoreOf(const Lobe& lobe, const std::vector<LobeSamples>& pixels, size_t s
           const LobeSamples& pixel = pixels[j * step];
           const LobeAnswer answer = SolveLobe(pixel, lobe);
           score.misfits[j] = answer.n.isZero() ? std::numeric_limits<double>::infinity()
-                                         : answer.misfit / pixel.limit;
+                                               : answer.misfit / pixel.limit;
         }
       });
   SATEEN_CHECK(done.has_value());

@@ -28,9 +28,9 @@ struct Difference {
 };
 
 Difference DifferenceOf(const Estimate& a, const Estimate& b) {
-  const double turned_deg = std::atan2(static_cast<double>(a.n.cross(b.n).norm()),
-                                       static_cast<double>(a.n.dot(b.n))) *
-                            kDegPerRad;
+  const double turned_deg =
+      std::atan2(static_cast<double>(a.n.cross(b.n).norm()), static_cast<double>(a.n.dot(b.n))) *
+      kDegPerRad;
   const double change = std::abs(static_cast<double>(a.albedo / b.albedo) - 1.0);
   return {turned_deg, change <= 1.0 ? change : 1.0};
 }
@@ -137,8 +137,8 @@ Doubt DoubtOf(const PieceSummary& total) {
 bool TakesLobe(const LobeAnswer& answer, float albedo_of_lobe, double share,
                double misfit_of_rung_1, const Estimate& of_rung_1, NormalField& field,
                size_t pixel) {
-  const double likely = LobeProbability(misfit_of_rung_1, answer.misfit,
-                                        field.samples.pixels[pixel] - 3, share);
+  const double likely =
+      LobeProbability(misfit_of_rung_1, answer.misfit, field.samples.pixels[pixel] - 3, share);
   const bool takes = likely >= 0.5;
   const Eigen::Vector3f n = answer.n.normalized().cast<float>();
   float& uncertainty = field.uncertainty.pixels[pixel];
@@ -156,8 +156,8 @@ bool TakesLobe(const LobeAnswer& answer, float albedo_of_lobe, double share,
   }
   const double of_other = std::sqrt(takes ? 1.0 - likely : likely);
   const Difference difference = DifferenceOf(of_rung_1, {n, albedo_of_lobe});
-  uncertainty = std::min(180.0F, std::hypot(uncertainty, static_cast<float>(
-                                                             of_other * difference.turned_deg)));
+  uncertainty = std::min(
+      180.0F, std::hypot(uncertainty, static_cast<float>(of_other * difference.turned_deg)));
   of_albedo =
       std::min(1.0F, std::hypot(of_albedo, static_cast<float>(of_other * difference.albedo)));
   return takes;

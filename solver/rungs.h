@@ -77,8 +77,8 @@ struct Doubt {
 // freedom, s^2 included, this is) and the lobe leave of its samples: then normal, residual, uncertainties and
 // rung are the lobe's. What the two differ by counts as much as the other is likely, in both uncertainties.
 [[nodiscard]] bool TakesLobe(const LobeAnswer& answer, float albedo_of_lobe, double share,
-                             double misfit_of_rung_1, const Estimate& of_rung_1,
-                             NormalField& field, size_t pixel);
+                             double misfit_of_rung_1, const Estimate& of_rung_1, NormalField& field,
+                             size_t pixel);
 
 [[nodiscard]] double SecondsOf(const std::function<void()>& work);
 

@@ -209,7 +209,8 @@ TEST(Lobe, BesideMatteClothEveryPixelSaysHowSureItIs) {
 TEST(Lobe, StrayLightIsNone) {
   Rig rig = RingRig(kLobeSize);
   for (size_t k = 0; k < rig.lights.size(); k += 2) {
-    rig.lights[k].position_mm.z() *= 0.5;  // one ring of lights does not tell it from a steeper normal
+    rig.lights[k].position_mm.z() *=
+        0.5;  // one ring of lights does not tell it from a steeper normal
   }
   const double step = 0.1 / kElectrons;
   for (const float stray : {0.2F, 0.4F}) {
