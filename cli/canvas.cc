@@ -69,11 +69,16 @@ void Canvas::Box(int x, int y, int width, int height, const Color8& ink) {
   cv::rectangle(mat, cv::Rect(x, y, width, height), ScalarOf(ink), cv::FILLED);
 }
 
-void Canvas::Text(const Eigen::Vector2d& at, const std::string& text, const Color8& ink) {
+void Canvas::Text(const Eigen::Vector2d& at, const std::string& text, const Color8& ink,
+                  double widest_px) {
+  int below_px = 0;
+  const double width_px =
+      cv::getTextSize(text, cv::FONT_HERSHEY_SIMPLEX, kTextScale, 1, &below_px).width;
+  const double scale = kTextScale * std::min(1.0, widest_px / width_px);
   cv::Mat mat = MatOf(pixels_, width_, height_);
   cv::putText(mat, text,
               {static_cast<int>(std::lround(at.x())), static_cast<int>(std::lround(at.y()))},
-              cv::FONT_HERSHEY_SIMPLEX, kTextScale, ScalarOf(ink), 1, cv::LINE_AA);
+              cv::FONT_HERSHEY_SIMPLEX, scale, ScalarOf(ink), 1, cv::LINE_AA);
 }
 
 void Canvas::Place(const Rgb8& picture, int x, int y) {
@@ -100,7 +105,7 @@ Rgb8 Canvas::Taken() const {
 Rgb8 Captioned(const Rgb8& panel, const std::string& caption) {
   Canvas canvas(panel[0].width, panel[0].height + kCaptionPx, kWhiteInk);
   canvas.Place(panel, 0, 0);
-  canvas.Text({2.0, panel[0].height + 0.75 * kCaptionPx}, caption, kBlackInk);
+  canvas.Text({2.0, panel[0].height + 0.75 * kCaptionPx}, caption, kBlackInk, panel[0].width - 4.0);
   return canvas.Taken();
 }
 

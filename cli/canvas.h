@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -32,7 +33,9 @@ class Canvas {
   void Dot(const Eigen::Vector2d& at, int radius_px, const Color8& ink);
   void Box(int x, int y, int width, int height, const Color8& ink);
   // Left end of the base line at `at`; capitals are 12 px high.
-  void Text(const Eigen::Vector2d& at, const std::string& text, const Color8& ink);
+  // Smaller where it would be wider than `widest_px`.
+  void Text(const Eigen::Vector2d& at, const std::string& text, const Color8& ink,
+            double widest_px = std::numeric_limits<double>::infinity());
   // The picture with its top left pixel at (x, y); what does not fit is cut off.
   void Place(const Rgb8& picture, int x, int y);
 

@@ -23,6 +23,8 @@
 namespace sateen::cli {
 namespace {
 
+constexpr double kMostHeight = 0.25;  // of the lowest light's: no cloth is thicker
+
 using Clock = std::chrono::steady_clock;
 
 double SecondsSince(Clock::time_point start) {
@@ -130,6 +132,17 @@ std::string WhyNotPassed(const SolveArgs& args, const SolveOutcome& outcome) {
 }
 
 // What the formats can say and this solver does not do, or must not.
+// Of those that have a place; infinite where none has.
+double LowestLightMm(const Rig& rig) {
+  double lowest_mm = std::numeric_limits<double>::infinity();
+  for (const Light& light : rig.lights) {
+    if (light.model != LightModel::kDistant) {
+      lowest_mm = std::min(lowest_mm, light.position_mm.z());
+    }
+  }
+  return lowest_mm;
+}
+
 Status CheckSupported(const SolveArgs& args, Capture& capture) {
   if (capture.session && capture.session->table_from_sheet) {
     return Fail(ErrorCode::kBadData,
@@ -161,6 +174,13 @@ Status CheckSupported(const SolveArgs& args, Capture& capture) {
                 "needs lights with a place: near, led or led+field, and a calibrated camera",
                 args.capture.string(), capture.rig.lights.size(),
                 args.relief ? "--relief" : "--height");
+  }
+  const double lowest_mm = LowestLightMm(capture.rig);
+  if (!(std::abs(args.height_mm) <= kMostHeight * lowest_mm)) {
+    return Fail(ErrorCode::kInvalidArgument,
+                "--height {:g}: the lowest light hangs {:.4g} mm above the table; need a surface "
+                "within a quarter of that, from {:.4g} to {:.4g} mm",
+                args.height_mm, lowest_mm, -kMostHeight * lowest_mm, kMostHeight * lowest_mm);
   }
   std::error_code ignored;  // a folder that does not exist yet is no other folder
   if (std::filesystem::equivalent(args.capture, args.output, ignored)) {

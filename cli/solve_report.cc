@@ -1,5 +1,6 @@
 #include "cli/solve_report.h"
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 
 namespace sateen::cli {
@@ -64,7 +65,7 @@ std::string WordsOf(const Lobe& lobe) {
     case LobeModel::kGgxAnisotropic:
       return fmt::format(
           "; the gloss of the scene's yarns has roughness {:.2f} across and {:.2f} along them, "
-          "strength {:.2f}; they lie at {:.0f} and {:.0f} degrees\n",
+          "strength {:.2f}; the yarns lie at {:.0f} and {:.0f} degrees from x\n",
           lobe.alpha, lobe.alpha_along, lobe.strength, std::fmod(lobe.azimuth_deg + 90.0, 180.0),
           lobe.azimuth_deg);
   }
@@ -95,18 +96,23 @@ nlohmann::json LadderToJson(const SolveSummary& summary) {
 }
 
 // What each rung did, a line each.
-std::string LadderWords(const SolveSummary& summary) {
+std::string LadderWords(const SolveSummary& summary, bool is_forced) {
   const auto rung = [](std::string_view name, const RungSummary& of) {
     return fmt::format("{}: {} pixels in {:.3f} s, mean uncertainty {:.2g} degrees", name,
                        of.pixels, of.seconds, of.mean_uncertainty_deg);
   };
-  std::string text = summary.least_squares.pixels > 0
-                         ? rung("least squares", summary.least_squares)
-                         : std::string("least squares: explain no pixel");
+  std::string text =
+      summary.least_squares.pixels > 0
+          ? rung("least squares", summary.least_squares)
+          : std::string(is_forced ? "least squares: not asked" : "least squares: no pixel");
   if (summary.unchecked > 0) {
     text += fmt::format("; {} with 3 samples, which nothing checks", summary.unchecked);
   }
-  text += '\n' + rung("robust", summary.robust);
+  if (is_forced && summary.robust.pixels == 0) {
+    return text + "; of noise alone: whether the samples fit was not asked\n";
+  }
+  text += '\n' + (summary.robust.pixels > 0 ? rung("robust", summary.robust)
+                                            : std::string("robust: no pixel"));
   if (summary.robust.pixels > 0) {
     text +=
         fmt::format("; it turned their normals by {:.3g} degrees in the mean", summary.turned_deg);
@@ -115,8 +121,8 @@ std::string LadderWords(const SolveSummary& summary) {
     text += fmt::format("; {} unexplained (see model.png)", summary.unexplained);
   }
   text += '\n';
-  if (static_cast<double>(summary.robust.pixels) >
-      kFewExplained * static_cast<double>(summary.solved)) {
+  if (!is_forced && static_cast<double>(summary.robust.pixels) >
+                        kFewExplained * static_cast<double>(summary.solved)) {
     text +=
         "nearly no pixel is as the lights say: the cloth shines, or the rig's lights are not "
         "calibrated or not these (sateen calibrate lights, calibrate check)\n";
@@ -216,7 +222,9 @@ std::string TextReport(const SolveArgs& args, const SolveOutcome& outcome) {
       "from {}\n",
       summary.solved, summary.pixels, size.width, size.height, outcome.capture.rig.lights.size(),
       summary.seconds, summary.threads, summary.threads == 1 ? "" : "s", BackendWords(summary),
-      outcome.capture.mosaics ? "the mosaics" : "interpolated colours");
+      outcome.capture.mosaics                                        ? "the mosaics"
+      : std::ranges::any_of(outcome.capture.stack, &LightFrame::raw) ? "interpolated colours"
+                                                                     : "colours");
   // Of photographs nobody expects it.
   if (!outcome.capture.why_no_mosaics.empty() &&
       outcome.capture.why_no_mosaics.find("not camera RAW") == std::string::npos) {
@@ -237,16 +245,19 @@ std::string TextReport(const SolveArgs& args, const SolveOutcome& outcome) {
     text += fmt::format("unsolved: {} (see reason.png)\n", words);
   }
   if (args.robust != "none") {
-    text += LadderWords(summary);
+    text += LadderWords(summary, args.robust != "auto");
+  }
+  if (!outcome.relief && args.height_mm != 0.0) {
+    text += fmt::format("the surface is taken {:g} mm above the table\n", args.height_mm);
   }
   if (outcome.relief) {
     const ReliefOutcome& relief = *outcome.relief;
     text += fmt::format(
-        "relief from {:.4g} to {:.4g} mm, found in {:.3f} s; solving again with it turned the "
-        "normals "
-        "by {:.3g} degrees in the mean, {:.3g} at most\n",
-        relief.lowest_mm, relief.highest_mm, relief.seconds, relief.turned_deg.mean,
-        relief.turned_deg.max);
+        "relief from {:+.3g} to {:+.3g} mm around {:g} mm, found in {:.3f} s; solving again with "
+        "it "
+        "turned the normals by {:.3g} degrees in the mean, {:.3g} at most\n",
+        relief.lowest_mm - args.height_mm, relief.highest_mm - args.height_mm, args.height_mm,
+        relief.seconds, relief.turned_deg.mean, relief.turned_deg.max);
   }
   if (outcome.angular_error_deg) {
     const ErrorStatistics& error = *outcome.angular_error_deg;

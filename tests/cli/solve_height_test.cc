@@ -117,9 +117,13 @@ TEST_F(SolveHeight, MeanIsThatOfTheOptionAndMapsMayBeUndistorted) {
 
 TEST_F(SolveHeight, IsRefusedWhereNoLightTellsOfItOrOneIsTooLow) {
   Render(R"({"shape": "plane"})", {"--linear"});
-  const RunResult above = SolveSession({"--height", "198"});
-  EXPECT_EQ(above.exit_status, 3);
-  EXPECT_THAT(above.log, HasSubstr("the surface is at 198 mm, but lights[0] is at 197.99 mm"));
+  for (const char* height : {"198", "50", "-60", "nan", "inf"}) {
+    const RunResult run = SolveSession({"--height", height});
+    EXPECT_EQ(run.exit_status, 2) << height;
+    EXPECT_THAT(run.log, HasSubstr("the lowest light hangs 198 mm above the table; need a surface "
+                                   "within a quarter of that, from -49.5 to 49.5 mm"))
+        << height;
+  }
   EXPECT_EQ(SolveSession({"--height", "thick"}).exit_status, 2);
 
   std::filesystem::create_directory(Path("far"));
