@@ -184,56 +184,55 @@ std::pair<double, double> StandardisedErrors(const NormalField& field,
 // Noise that hides much of the lobe: pixels that have it and pixels that do not are told apart by odds, and
 // what is not sure is in the uncertainty.
 TEST(Lobe, BesideMatteClothEveryPixelSaysHowSureItIs) {
+  constexpr int kShare = 90;  // of 100
+  constexpr double kFewElectrons = 100000.0;
   const Rig rig = RingRig(kLobeSize);
-  const Lobe lobe{.model = LobeModel::kGgx, .alpha = 0.3, .strength = 1.0};
-  for (const int share : {90, 100}) {
-    RenderedRelief rendered = Render(rig, kLobeSize, 20.0);
-    AddLobe(rig, lobe, share, 100000.0, rendered);
-    for (Image<float>& plane : rendered.albedo.planes) {
-      for (float& rho : plane.pixels) {
-        rho *= 0.03F;
-      }
+  RenderedRelief rendered = Render(rig, kLobeSize, 20.0);
+  AddLobe(rig, {.model = LobeModel::kGgx, .alpha = 0.3, .strength = 1.0}, kShare, kFewElectrons,
+          rendered);
+  for (Image<float>& plane : rendered.albedo.planes) {
+    for (float& rho : plane.pixels) {
+      rho *= 0.03F;
     }
-    const NormalField field =
-        MustSolve(rendered.stack, rig, WithShotNoise(100000.0, rig.lights.size()));
-    ASSERT_TRUE(field.summary.lobe) << share;
-    EXPECT_NEAR(field.summary.lobe->share, 0.01 * share, 0.1);
-    const auto [angle, albedo] = StandardisedErrors(field, rendered);
-    EXPECT_LT(angle, 1.3) << share;
-    EXPECT_GT(angle, 0.15) << share;
-    EXPECT_LT(albedo, 1.3) << share;
   }
+  const NormalField field =
+      MustSolve(rendered.stack, rig, WithShotNoise(kFewElectrons, rig.lights.size()));
+  ASSERT_TRUE(field.summary.lobe);
+  EXPECT_NEAR(field.summary.lobe->share, 0.01 * kShare, 0.1);
+  const auto [angle, albedo] = StandardisedErrors(field, rendered);
+  EXPECT_LT(angle, 1.3);
+  EXPECT_GT(angle, 0.15);
+  EXPECT_LT(albedo, 1.3);
 }
 
 // Light from everywhere, a share of the lights' mean, looks like gloss that is rougher and stronger than any.
 TEST(Lobe, StrayLightIsNone) {
+  constexpr float kStray = 0.4F;
   Rig rig = RingRig(kLobeSize);
   for (size_t k = 0; k < rig.lights.size(); k += 2) {
-    rig.lights[k].position_mm.z() *=
-        0.5;  // one ring of lights does not tell it from a steeper normal
+    // One ring of lights does not tell stray light from a steeper normal.
+    rig.lights[k].position_mm.z() *= 0.5;
   }
   const double step = 0.1 / kElectrons;
-  for (const float stray : {0.2F, 0.4F}) {
-    RenderedRelief rendered = Render(rig, kLobeSize, 20.0);
-    std::mt19937 random(7);
-    for (size_t p = 0; p < kLobeSize.PixelCount(); ++p) {
-      for (size_t c = 0; c < 3; ++c) {
-        float mean = 0.0F;
-        for (const LightFrame& frame : rendered.stack) {
-          mean += frame.rgb[c].pixels[p] / static_cast<float>(rendered.stack.size());
-        }
-        for (LightFrame& frame : rendered.stack) {
-          float& i = frame.rgb[c].pixels[p];
-          std::poisson_distribution<int> count(static_cast<double>(i + stray * mean) / step);
-          i = static_cast<float>(count(random) * step);
-        }
+  RenderedRelief rendered = Render(rig, kLobeSize, 20.0);
+  std::mt19937 random(7);
+  for (size_t p = 0; p < kLobeSize.PixelCount(); ++p) {
+    for (size_t c = 0; c < 3; ++c) {
+      float mean = 0.0F;
+      for (const LightFrame& frame : rendered.stack) {
+        mean += frame.rgb[c].pixels[p] / static_cast<float>(rendered.stack.size());
+      }
+      for (LightFrame& frame : rendered.stack) {
+        float& i = frame.rgb[c].pixels[p];
+        std::poisson_distribution<int> count(static_cast<double>(i + kStray * mean) / step);
+        i = static_cast<float>(count(random) * step);
       }
     }
-    const NormalField field =
-        MustSolve(rendered.stack, rig, WithShotNoise(kElectrons, rig.lights.size()));
-    EXPECT_FALSE(field.summary.lobe) << stray;
-    EXPECT_GT(field.summary.robust.pixels, 1000) << stray;  // so that one was looked for
   }
+  const NormalField field =
+      MustSolve(rendered.stack, rig, WithShotNoise(kElectrons, rig.lights.size()));
+  EXPECT_FALSE(field.summary.lobe);
+  EXPECT_GT(field.summary.robust.pixels, 1000);  // so that one was looked for
 }
 
 TEST(Lobe, TheLightsDoubtIsInItsUncertainty) {
