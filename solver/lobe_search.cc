@@ -20,13 +20,14 @@ constexpr double kLobeImproves = 0.8;
 constexpr double kCoarseImproves = 0.9;
 // What a pixel counts for at most.
 constexpr double kMostOfAPixel = 20.0;
-constexpr std::array kAlphas = {0.15, 0.2, 0.3, 0.4, 0.5, 0.65, 0.85};
+constexpr std::array kAlphas = {0.15, 0.2, 0.3, 0.4, 0.5, 0.65, 0.8};
 constexpr std::array kStrengths = {0.35, 0.7, 1.4, 2.8};
 constexpr std::array kYarnAlphas = {0.2, 0.35, 0.5};
 constexpr std::array kYarnRatios = {0.3, 0.55};
 constexpr std::array kYarnStrengths = {0.7, 1.4};
 constexpr std::array kYarnAzimuthsDeg = {0.0, 22.5, 45.0, 67.5};
 constexpr double kLeastAlpha = 0.1;
+constexpr double kMostFuzzAlpha = 0.85;
 constexpr double kMostGlossAlpha = 0.7;
 constexpr double kLeastStrength = 0.15;
 constexpr double kMostStrength = 3.0;
@@ -91,11 +92,13 @@ Score ScoreOf(const Lobe& lobe, const std::vector<LobeSamples>& pixels, size_t s
   return score;
 }
 
-double MostAlpha(LobeModel model) { return model == LobeModel::kCloth ? 1.0 : kMostGlossAlpha; }
+double MostAlpha(LobeModel model) {
+  return model == LobeModel::kCloth ? kMostFuzzAlpha : kMostGlossAlpha;
+}
 
 bool IsWithinBounds(const Lobe& lobe) {
   return lobe.strength > kLeastStrength && lobe.strength < kMostStrength &&
-         (lobe.model == LobeModel::kCloth || lobe.alpha < kMostGlossAlpha);
+         lobe.alpha < MostAlpha(lobe.model);
 }
 
 // The lobe changed by so many steps of its figures.

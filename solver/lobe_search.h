@@ -12,7 +12,7 @@ namespace sateen {
 
 // Equation (15) over these pixels, and which share of them has the lobe. Nothing where they are fewer than
 // 64; where no lobe explains 70 of 100, halves what least squares leave unexplained and takes a fifth
-// off (15); or where the best is beyond what cloth has: a strength of 0.15 to 3, gloss of a roughness up to 0.7. Stray
+// off (15); or where the best is beyond what cloth has: a strength of 0.15 to 3, a roughness up to 0.7, of fuzz 0.85. Stray
 // light and bounces look like rougher and stronger gloss.
 [[nodiscard]] std::optional<Lobe> SearchLobe(const std::vector<LobeSamples>& pixels, int threads);
 
