@@ -90,7 +90,7 @@ struct LadderOptions {
 ///
 ///     i'_k = N . l_k + s_k(n),  s_k = a pi f(n, l_k, v) max(0, n . l_k), v towards the camera   (13)
 ///     N <- N + (J^T W J)^-1 J^T W r,  r_k = i'_k - s_k - N . l_k,  J_k = l_k + ds_k / dN        (14)
-///     a, alpha = argmin sum over some 400 pixels of log(1 + misfit / limit)                  (15)
+///     a, alpha = argmin sum over some 400 pixels of min(log(1 + misfit / limit), 20)         (15)
 ///
 /// f is Cloth, Ggx or GgxAnisotropic of reflectance/specular.h with F0 = 0.04; of the last, which is
 /// tried where no other does, every pixel takes the better of two tangents at a right angle: warp or

@@ -10,10 +10,10 @@
 
 namespace sateen {
 
-// Equation (15) over these pixels, and which share of them has the lobe. Nothing where they are fewer than
-// 64; where no lobe explains 70 of 100, halves what least squares leave unexplained and takes a fifth
-// off (15); or where the best is beyond what cloth has: a strength of 0.15 to 3, a roughness up to 0.7, of fuzz 0.85. Stray
-// light and bounces look like rougher and stronger gloss.
+// Equation (15) over these pixels, and which share of them has the lobe. Nothing where they are fewer
+// than 64; where no lobe explains 70 of 100, halves what least squares leave unexplained and takes a
+// fifth off (15); or where the best is beyond what cloth has: a strength of 0.15 to 3, a roughness up
+// to 0.7, of fuzz 0.85. Stray light and bounces look like a rougher and stronger lobe.
 [[nodiscard]] std::optional<Lobe> SearchLobe(const std::vector<LobeSamples>& pixels, int threads);
 
 // Pixels that SearchLobe() is to be given, and the share that rung 1 has to explain so that no lobe is looked
