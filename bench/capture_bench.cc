@@ -18,7 +18,7 @@
 
 #include "core/file_io.h"
 #include "core/scratch_folder.h"
-#include "scanner/capture_request.h"
+#include "scanner/capture/capture_request.h"
 
 namespace {
 

@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "core/interrupt.h"
-#include "tests/virtual_rig/daemon_stress.h"
+#include "tests/simulation/virtual_rig/daemon_stress.h"
 
 namespace {
 

@@ -25,12 +25,12 @@
 #include "imaging/dng.h"
 #include "imaging/raw.h"
 #include "rig/rig.h"
-#include "scanner/session.h"
+#include "scanner/sessions/session.h"
 #include "simulation/random.h"
 #include "simulation/rigs.h"
 #include "solver/evaluate.h"
 #include "solver/ladder.h"
-#include "solver/mosaic.h"
+#include "solver/mosaic/mosaic.h"
 
 namespace {
 

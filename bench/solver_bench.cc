@@ -8,7 +8,7 @@
 #include "rig/table_grid.h"
 #include "simulation/relief.h"
 #include "simulation/rigs.h"
-#include "solver/fast_rows.h"
+#include "solver/least_squares/fast_rows.h"
 
 namespace sateen {
 namespace {

@@ -4,6 +4,7 @@
 #include <ostream>
 
 #include "core/output_folder.h"
+#include "core/version.h"
 #include "targets/page.h"
 
 namespace sateen::cli {
@@ -60,7 +61,7 @@ std::string TextReport(const BoardPrintArgs& args, const Page& page) {
 std::string JsonReport(const BoardPrintArgs& args, const Page& page) {
   const auto pair = [](const Eigen::Vector2d& v) { return nlohmann::json{v.x(), v.y()}; };
   const nlohmann::json report = {{"schema", "sateen.board.print/1"},
-                                 {"version", SATEEN_VERSION},
+                                 {"version", Version()},
                                  {"output", args.output.string()},
                                  {"target", page.spec},
                                  {"size_mm", pair(page.print.SizeMm())},

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "core/task.h"
-#include "scanner/capture_request.h"
+#include "scanner/capture/capture_request.h"
 #include "scanner/daemon/http_client.h"
 
 namespace sateen::cli {

@@ -4,7 +4,7 @@
 #include <optional>
 
 #include "scanner/daemon/http_client.h"
-#include "scanner/rig_devices.h"
+#include "scanner/devices/rig_devices.h"
 
 namespace sateen::cli {
 

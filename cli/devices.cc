@@ -7,7 +7,7 @@
 
 #include "scanner/daemon/device_list.h"
 #include "scanner/daemon/http_client.h"
-#include "scanner/light_board.h"
+#include "scanner/devices/light_board.h"
 
 namespace sateen::cli {
 namespace {

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "core/task.h"
-#include "scanner/find_camera.h"
-#include "scanner/serial_port.h"
+#include "scanner/devices/find_camera.h"
+#include "scanner/devices/serial_port.h"
 
 namespace sateen::cli {
 

@@ -11,8 +11,8 @@
 #include "rig/rig.h"
 #include "scanner/daemon/board_job.h"
 #include "scanner/daemon/light_job.h"
-#include "scanner/light_board.h"
-#include "scanner/serial_port.h"
+#include "scanner/devices/light_board.h"
+#include "scanner/devices/serial_port.h"
 
 namespace sateen::cli {
 namespace {

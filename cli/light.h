@@ -8,8 +8,8 @@
 #include <string>
 
 #include "core/task.h"
-#include "scanner/byte_port.h"
 #include "scanner/daemon/http_client.h"
+#include "scanner/devices/byte_port.h"
 
 namespace sateen::cli {
 

@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "scanner/light_board.h"
+#include "scanner/devices/light_board.h"
 
 namespace sateen::cli {
 

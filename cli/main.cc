@@ -6,12 +6,12 @@
 #include <iostream>
 #include <new>
 
-#include "cli/bench_accuracy.h"
-#include "cli/bench_calibrate.h"
-#include "cli/bench_simulate.h"
-#include "cli/bench_solve.h"
+#include "cli/bench/bench_accuracy.h"
+#include "cli/bench/bench_calibrate.h"
+#include "cli/bench/bench_simulate.h"
+#include "cli/bench/bench_solve.h"
 #include "cli/board.h"
-#include "cli/calibrate.h"
+#include "cli/calibrate/calibrate.h"
 #include "cli/capture.h"
 #include "cli/devices.h"
 #include "cli/light.h"
@@ -22,6 +22,7 @@
 #include "cli/solve.h"
 #include "core/interrupt.h"
 #include "core/progress_bar.h"
+#include "core/version.h"
 
 namespace {
 
@@ -32,7 +33,7 @@ constexpr int kInputOutput = 4;
 int Run(int argc, char** argv) {
   CLI::App app("Photometric-stereo scanner: from frames to normal and albedo maps", "sateen");
   app.require_subcommand(1);
-  app.set_version_flag("--version", "sateen " SATEEN_VERSION);
+  app.set_version_flag("--version", "sateen " + sateen::Version());
   app.footer(
       "Exit status: 0 done, 1 internal error, 2 usage, 3 bad or degenerate data, 4 input or "
       "output,\n             5 device, 6 cancelled.");

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "core/task.h"
-#include "scanner/preview.h"
+#include "scanner/capture/preview.h"
 
 namespace sateen::cli {
 

@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/version.h"
 #include "scanner/daemon/access.h"
 #include "scanner/daemon/api.h"
 #include "scanner/daemon/http_server.h"
@@ -99,7 +100,7 @@ int RunServeOn(const ServeArgs& args, std::unique_ptr<RigDevices> devices,
     return ExitStatus(doors.error());
   }
   RigService service(std::move(devices));
-  const Api api(service, {.version = SATEEN_VERSION, .capture = capture});
+  const Api api(service, {.version = Version(), .capture = capture});
   std::vector<std::unique_ptr<HttpServer>> servers;
   for (Door& door : *doors) {
     servers.push_back(std::make_unique<HttpServer>(std::move(door.listener), api, service,

@@ -7,8 +7,8 @@
 #include <string>
 
 #include "core/task.h"
-#include "scanner/capture_options.h"
-#include "scanner/rig_devices.h"
+#include "scanner/capture/capture_options.h"
+#include "scanner/devices/rig_devices.h"
 
 namespace sateen::cli {
 

@@ -3,7 +3,7 @@
 #include <nlohmann/json.hpp>
 #include <ostream>
 
-#include "scanner/capture_session.h"
+#include "scanner/capture/capture_session.h"
 
 namespace sateen::cli {
 

@@ -7,17 +7,17 @@
 #include <tuple>
 #include <vector>
 
-#include "cli/canvas.h"
-#include "cli/pictures.h"
 #include "cli/quantity.h"
 #include "core/json.h"
 #include "core/output_folder.h"
 #include "core/sha256.h"
 #include "imaging/image_io.h"
 #include "imaging/raw.h"
+#include "imaging/show/canvas.h"
+#include "imaging/show/pictures.h"
 #include "rig/rig.h"
-#include "scanner/folder_listing.h"
-#include "scanner/session.h"
+#include "scanner/sessions/files/folder_listing.h"
+#include "scanner/sessions/session.h"
 
 namespace sateen::cli {
 namespace {

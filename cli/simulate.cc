@@ -4,8 +4,8 @@
 #include <ostream>
 #include <utility>
 
-#include "cli/scene_file.h"
-#include "cli/simulated_session.h"
+#include "pipelines/simulate/scene_file.h"
+#include "pipelines/simulate/simulated_session.h"
 
 namespace sateen::cli {
 namespace {

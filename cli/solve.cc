@@ -9,15 +9,15 @@
 #include <ostream>
 #include <utility>
 
-#include "cli/maps.h"
-#include "cli/mosaic_maps.h"
 #include "cli/solve_report.h"
 #include "core/output_folder.h"
 #include "imaging/image_io.h"
-#include "solver/fast_rows.h"
+#include "pipelines/solve/maps.h"
+#include "pipelines/solve/mosaic_maps.h"
 #include "solver/height.h"
 #include "solver/ladder.h"
-#include "solver/mosaic.h"
+#include "solver/least_squares/fast_rows.h"
+#include "solver/mosaic/mosaic.h"
 #include "solver/undistort.h"
 
 namespace sateen::cli {

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "core/task.h"
-#include "scanner/stack_reader.h"
+#include "scanner/sessions/stack_reader.h"
 #include "solver/evaluate.h"
 #include "solver/lambertian.h"
 

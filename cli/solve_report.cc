@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "core/version.h"
+
 namespace sateen::cli {
 namespace {
 
@@ -151,7 +153,7 @@ std::string JsonReport(const SolveArgs& args, const SolveOutcome& outcome) {
   const SolveSummary& summary = outcome.field.summary;
   const ImageSize size = outcome.capture.Size();
   nlohmann::json report = {{"schema", "sateen.solve/1"},
-                           {"version", SATEEN_VERSION},
+                           {"version", Version()},
                            {"capture", args.capture.string()},
                            {"layout", outcome.capture.layout},
                            {"output", args.output.string()},

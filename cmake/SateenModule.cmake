@@ -1,7 +1,8 @@
 # sateen_add_module(<name> SOURCES ... [PUBLIC ...] [PRIVATE ...] [TESTS ...] [TEST_LIBS ...])
 #
-# Declares the library sateen_<name>, its alias sateen::<name>, and one test executable for each
-# file in TESTS, found in tests/<name>/ and registered with CTest as "<name>/<test>".
+# Declares the library sateen_<name> and its alias sateen::<name>. TESTS are files of the folder in
+# tests/ that mirrors the module's own; together they are one program, sateen_<name>_test, and each
+# is one test of CTest, "<folder>/<file>".
 function(sateen_add_module name)
   cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "SOURCES;PUBLIC;PRIVATE;TESTS;TEST_LIBS")
   if(arg_UNPARSED_ARGUMENTS)
@@ -15,30 +16,55 @@ function(sateen_add_module name)
     $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}> $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}/sateen>)
   target_link_libraries(sateen_${name} PUBLIC ${arg_PUBLIC} PRIVATE ${arg_PRIVATE})
   sateen_set_warnings(sateen_${name})
-  if(SATEEN_BUILD_TESTS)
-    foreach(source IN LISTS arg_TESTS)
-      get_filename_component(test ${source} NAME_WE)
-      add_executable(sateen_${name}_${test} ${PROJECT_SOURCE_DIR}/tests/${name}/${source})
-      target_link_libraries(sateen_${name}_${test} PRIVATE
-        sateen::${name} ${arg_PRIVATE} ${arg_TEST_LIBS} sateen::testing GTest::gmock_main)
-      sateen_set_warnings(sateen_${name}_${test})
-      add_test(NAME ${name}/${test} COMMAND sateen_${name}_${test})
-    endforeach()
+  if(SATEEN_BUILD_TESTS AND arg_TESTS)
+    file(RELATIVE_PATH folder ${PROJECT_SOURCE_DIR} ${CMAKE_CURRENT_SOURCE_DIR})
+    list(TRANSFORM arg_TESTS PREPEND ${PROJECT_SOURCE_DIR}/tests/${folder}/ OUTPUT_VARIABLE sources)
+    add_executable(sateen_${name}_test ${sources})
+    target_link_libraries(sateen_${name}_test PRIVATE
+      sateen::${name} ${arg_PRIVATE} ${arg_TEST_LIBS} sateen::testing GTest::gmock_main)
+    sateen_set_warnings(sateen_${name}_test)
+    sateen_register_tests(sateen_${name}_test ${folder} ${sources})
   endif()
+endfunction()
+
+# sateen_register_tests(<target> <folder> <source>...): a test of CTest for each source, which runs
+# what TEST, TEST_F and TEST_P define in it, and one that fails where the program has others.
+function(sateen_register_tests target folder)
+  set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${ARGN})
+  set(all "")
+  foreach(source IN LISTS ARGN)
+    file(READ ${source} text)
+    string(REGEX MATCHALL "TEST(_F|_P)?\\([A-Za-z0-9_]+,[ \n]*[A-Za-z0-9_]+\\)" heads "${text}")
+    list(TRANSFORM heads REPLACE
+      "TEST(_F|_P)?\\(([A-Za-z0-9_]+),[ \n]*([A-Za-z0-9_]+)\\)" "\\2.\\3:*/\\2.\\3/*")
+    list(JOIN heads ":" filter)
+    get_filename_component(test ${source} NAME_WE)
+    add_test(NAME ${folder}/${test} COMMAND ${target} --gtest_filter=${filter})
+    list(APPEND all ${filter})
+  endforeach()
+  list(JOIN all ":" all)
+  add_test(NAME ${folder}/all_are_registered COMMAND ${target} --gtest_list_tests --gtest_filter=-${all})
+  set_tests_properties(${folder}/all_are_registered PROPERTIES FAIL_REGULAR_EXPRESSION "\n  [A-Z]")
 endfunction()
 
 # sateen_install_module(<name> HEADERS ...): the library, and those of its headers that other CMake
 # projects may include.
 function(sateen_install_module name)
   cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "HEADERS")
+  file(RELATIVE_PATH module_folder ${PROJECT_SOURCE_DIR} ${CMAKE_CURRENT_SOURCE_DIR})
   install(TARGETS sateen_${name} EXPORT sateen-targets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
-  install(FILES ${arg_HEADERS} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/sateen/${name})
+  foreach(header IN LISTS arg_HEADERS)
+    get_filename_component(room ${header} DIRECTORY)
+    install(FILES ${header} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/sateen/${module_folder}/${room})
+  endforeach()
 endfunction()
 
 function(sateen_set_warnings target)
   target_compile_options(${target} PRIVATE -Wall -Wextra -Wshadow -Wconversion -Wdouble-promotion
     # Options are given by name, and what is not named keeps its default.
-    -Wno-missing-field-initializers)
+    -Wno-missing-field-initializers
+    # In a unity build every source is an included file, for which g++ says this of any private type.
+    $<$<AND:$<COMPILE_LANGUAGE:CXX>,$<CXX_COMPILER_ID:GNU>>:-Wno-subobject-linkage>)
   if(SATEEN_WARNINGS_AS_ERRORS)
     target_compile_options(${target} PRIVATE -Werror)
   endif()

@@ -37,7 +37,7 @@ struct Rig {
 [[nodiscard]] Eigen::Vector3d WhiteBalanceOf(const Rig& rig);
 
 // The lights as a rig of another white balance has them: fluxes are in balanced units, as the frames
-// are (scanner/sensor_reading.h), so that albedo stays what it is.
+// are (scanner/sessions/sensor_reading.h), so that albedo stays what it is.
 [[nodiscard]] Lights Rebalanced(Lights lights, const Eigen::Vector3d& from,
                                 const Eigen::Vector3d& to);
 

@@ -10,11 +10,11 @@
 
 #include "core/angle.h"
 #include "core/parallel.h"
-#include "solver/climb.h"
-#include "solver/consensus.h"
-#include "solver/least_squares.h"
-#include "solver/lobe_search.h"
-#include "solver/noise_scale.h"
+#include "solver/kernels/consensus.h"
+#include "solver/least_squares/least_squares.h"
+#include "solver/lobe/lobe_search.h"
+#include "solver/robust/climb.h"
+#include "solver/robust/noise_scale.h"
 
 namespace sateen {
 namespace {

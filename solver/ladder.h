@@ -95,7 +95,7 @@ struct LadderOptions {
 /// f is Cloth, Ggx or GgxAnisotropic of reflectance/specular.h with F0 = 0.04; of the last, which is
 /// tried where no other does, every pixel takes the better of two tangents at a right angle: warp or
 /// weft. It is looked for where rung 1 explains fewer than 80 of 100 pixels, and believed where (14)
-/// explains 70, halves what is unexplained and takes a fifth off (15) (solver/lobe_search.h). A pixel that
+/// explains 70, halves what is unexplained and takes a fifth off (15) (solver/lobe/lobe_search.h). A pixel that
 /// it explains takes it where
 ///
 ///     share exp(-chi^2 / 2) > (1 - share) exp(-chi_1^2 / 2)                                   (17)

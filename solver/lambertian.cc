@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "core/parallel.h"
-#include "solver/fast_rows.h"
-#include "solver/least_squares.h"
+#include "solver/least_squares/fast_rows.h"
+#include "solver/least_squares/least_squares.h"
 
 namespace sateen {
 namespace {

@@ -10,7 +10,7 @@
 #include "imaging/image.h"
 #include "imaging/light_stack.h"
 #include "rig/rig.h"
-#include "solver/lobe_term.h"
+#include "solver/lobe/lobe_term.h"
 
 namespace sateen {
 

@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "imaging/color.h"
-#include "solver/pixel_system.h"
+#include "solver/least_squares/pixel_system.h"
 
 namespace sateen {
 namespace {

@@ -8,7 +8,7 @@
 #include <thread>
 
 #include "scanner/camera_worker/gphoto_session.h"
-#include "scanner/worker_message.h"
+#include "scanner/devices/worker_message.h"
 
 // sateen-camera-worker: started by PtpCamera with a socket as its standard input, so that a call of
 // libgphoto2 that never returns hangs this process and not the capture.

@@ -8,11 +8,11 @@
 #include <vector>
 
 #include "core/error.h"
-#include "scanner/capture_request.h"
+#include "scanner/capture/capture_request.h"
+#include "scanner/capture/preview.h"
 #include "scanner/daemon/board_job.h"
 #include "scanner/daemon/light_job.h"
 #include "scanner/daemon/rig_service.h"
-#include "scanner/preview.h"
 
 // What the daemon answers, as JSON and back; docs/api.md has the keys. Texts are one line.
 namespace sateen {

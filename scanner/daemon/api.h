@@ -4,7 +4,7 @@
 #include <optional>
 #include <string>
 
-#include "scanner/capture_options.h"
+#include "scanner/capture/capture_options.h"
 #include "scanner/daemon/rig_service.h"
 
 namespace sateen {

@@ -4,10 +4,10 @@
 #include <string>
 
 #include "core/error.h"
-#include "scanner/capture_request.h"
+#include "scanner/capture/capture_request.h"
+#include "scanner/capture/preview.h"
 #include "scanner/daemon/board_job.h"
 #include "scanner/daemon/light_job.h"
-#include "scanner/preview.h"
 
 // What the daemon is asked, as JSON and back; docs/api.md has the keys. A key that a request shall have
 // is added to its two functions here. Readers are strict: an unknown key, a wrong type and a value out

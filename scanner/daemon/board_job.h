@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "core/error.h"
-#include "scanner/light_board.h"
+#include "scanner/devices/light_board.h"
 
 namespace sateen {
 

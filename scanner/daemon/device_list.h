@@ -4,10 +4,10 @@
 #include <vector>
 
 #include "core/error.h"
-#include "scanner/find_camera.h"
-#include "scanner/light_board.h"
-#include "scanner/serial_port.h"
-#include "scanner/tethered_camera.h"
+#include "scanner/devices/find_camera.h"
+#include "scanner/devices/light_board.h"
+#include "scanner/devices/serial_port.h"
+#include "scanner/devices/tethered_camera.h"
 
 namespace sateen {
 

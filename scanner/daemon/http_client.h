@@ -7,12 +7,12 @@
 
 #include "core/error.h"
 #include "core/task.h"
-#include "scanner/capture_request.h"
+#include "scanner/capture/capture_request.h"
+#include "scanner/capture/preview.h"
 #include "scanner/daemon/board_job.h"
 #include "scanner/daemon/device_list.h"
 #include "scanner/daemon/job.h"
 #include "scanner/daemon/light_job.h"
-#include "scanner/preview.h"
 
 namespace sateen {
 

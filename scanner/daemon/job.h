@@ -9,7 +9,7 @@
 
 #include "core/error.h"
 #include "core/task.h"
-#include "scanner/rig_devices.h"
+#include "scanner/devices/rig_devices.h"
 
 namespace sateen {
 

@@ -7,7 +7,7 @@
 
 #include "core/error.h"
 #include "core/task.h"
-#include "scanner/light_board.h"
+#include "scanner/devices/light_board.h"
 
 namespace sateen {
 

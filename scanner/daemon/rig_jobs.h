@@ -4,11 +4,11 @@
 #include <memory>
 #include <string>
 
-#include "scanner/capture_request.h"
+#include "scanner/capture/capture_request.h"
+#include "scanner/capture/preview.h"
 #include "scanner/daemon/board_job.h"
 #include "scanner/daemon/job.h"
 #include "scanner/daemon/light_job.h"
-#include "scanner/preview.h"
 
 // What the daemon does when it is asked: each makes one job of a request.
 namespace sateen {

@@ -13,8 +13,8 @@
 
 #include "core/error.h"
 #include "scanner/daemon/job.h"
-#include "scanner/light_board.h"
-#include "scanner/rig_devices.h"
+#include "scanner/devices/light_board.h"
+#include "scanner/devices/rig_devices.h"
 
 namespace sateen {
 

@@ -9,7 +9,7 @@
 #include <random>
 #include <utility>
 
-#include "scanner/light_board.h"
+#include "scanner/devices/light_board.h"
 
 namespace sateen {
 namespace {

@@ -7,8 +7,8 @@
 
 #include "core/parallel.h"
 #include "imaging/image_io.h"
-#include "scanner/frame_loader.h"
-#include "scanner/session_layout.h"
+#include "scanner/sessions/frame_loader.h"
+#include "scanner/sessions/session_layout.h"
 
 namespace sateen {
 namespace {

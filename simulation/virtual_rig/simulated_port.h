@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "scanner/byte_port.h"
+#include "scanner/devices/byte_port.h"
 #include "simulation/virtual_rig/virtual_board.h"
 
 namespace sateen {

@@ -1,4 +1,4 @@
-#include "calibration/board_find.h"
+#include "calibration/print/board_find.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -6,7 +6,7 @@
 #include "tests/calibration/synthetic_boards.h"
 #include "tests/calibration/test_pictures.h"
 
-namespace sateen {
+namespace sateen::board_find_test {
 namespace {
 
 using namespace sateen::testing;
@@ -124,4 +124,4 @@ TEST(FindBoard, BlankPictures) {
 }
 
 }  // namespace
-}  // namespace sateen
+}  // namespace sateen::board_find_test

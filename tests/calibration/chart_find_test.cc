@@ -1,4 +1,4 @@
-#include "calibration/chart_find.h"
+#include "calibration/response/chart_find.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -7,7 +7,7 @@
 
 #include "core/angle.h"
 
-namespace sateen {
+namespace sateen::chart_find_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -117,4 +117,4 @@ TEST(Chart, NamesWhatIsOutOfRange) {
 }
 
 }  // namespace
-}  // namespace sateen
+}  // namespace sateen::chart_find_test

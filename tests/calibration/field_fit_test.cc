@@ -1,4 +1,4 @@
-#include "calibration/field_fit.h"
+#include "calibration/lights/field_fit.h"
 
 #include <fmt/core.h>
 #include <gmock/gmock.h>
@@ -6,11 +6,11 @@
 
 #include <cmath>
 
-#include "calibration/light_fit.h"
+#include "calibration/lights/light_fit.h"
 #include "simulation/rigs.h"
 #include "tests/calibration/synthetic_sheets.h"
 
-namespace sateen {
+namespace sateen::field_fit_test {
 namespace {
 
 using sateen::testing::SamplesOf;
@@ -190,4 +190,4 @@ TEST(FitField, ErrorsNameTheirReason) {
 }
 
 }  // namespace
-}  // namespace sateen
+}  // namespace sateen::field_fit_test

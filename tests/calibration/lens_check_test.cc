@@ -3,10 +3,10 @@
 
 #include <limits>
 
-#include "calibration/lens.h"
+#include "calibration/lens/lens.h"
 #include "core/angle.h"
 
-namespace sateen {
+namespace sateen::lens_check_test {
 namespace {
 
 using ::testing::ElementsAre;
@@ -110,4 +110,4 @@ TEST(WarningsOf, DistortionThatTheCornersDoNotTell) {
 }
 
 }  // namespace
-}  // namespace sateen
+}  // namespace sateen::lens_check_test

@@ -1,15 +1,15 @@
-#include "calibration/lens.h"
+#include "calibration/lens/lens.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "calibration/markers.h"
+#include "calibration/print/markers.h"
 #include "imaging/image_io.h"
 #include "tests/calibration/synthetic_boards.h"
 #include "tests/calibration/test_pictures.h"
 #include "tests/testing/files.h"
 
-namespace sateen {
+namespace sateen::lens_test {
 namespace {
 
 using namespace sateen::testing;
@@ -261,4 +261,4 @@ TEST(CalibrateLens, ErrorsSayWhatToDo) {
 }
 
 }  // namespace
-}  // namespace sateen
+}  // namespace sateen::lens_test

@@ -1,4 +1,4 @@
-#include "calibration/light_check.h"
+#include "calibration/check/light_check.h"
 
 #include <fmt/core.h>
 #include <gmock/gmock.h>
@@ -7,7 +7,7 @@
 #include "simulation/rigs.h"
 #include "tests/calibration/synthetic_sheets.h"
 
-namespace sateen {
+namespace sateen::light_check_test {
 namespace {
 
 using sateen::testing::SamplesOf;
@@ -342,4 +342,4 @@ TEST(LightCheck, ErrorsSayWhatToDo) {
 }
 
 }  // namespace
-}  // namespace sateen
+}  // namespace sateen::light_check_test

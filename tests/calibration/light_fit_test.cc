@@ -1,4 +1,4 @@
-#include "calibration/light_fit.h"
+#include "calibration/lights/light_fit.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,7 +8,7 @@
 #include "simulation/rigs.h"
 #include "tests/calibration/synthetic_sheets.h"
 
-namespace sateen {
+namespace sateen::light_fit_test {
 namespace {
 
 using sateen::testing::SamplesOf;
@@ -158,4 +158,4 @@ TEST(FitLight, ErrorsSayWhatToDo) {
 }
 
 }  // namespace
-}  // namespace sateen
+}  // namespace sateen::light_fit_test

@@ -1,8 +1,8 @@
-#include "calibration/linear_range.h"
+#include "calibration/response/linear_range.h"
 
 #include <gtest/gtest.h>
 
-namespace sateen {
+namespace sateen::linear_range_test {
 namespace {
 
 constexpr double kTolerance = 0.01;
@@ -104,4 +104,4 @@ TEST(FindLinearRange, GoesDownToWhereTheToleranceIsLeft) {
 }
 
 }  // namespace
-}  // namespace sateen
+}  // namespace sateen::linear_range_test

@@ -1,10 +1,10 @@
-#include "calibration/photon_transfer.h"
+#include "calibration/response/photon_transfer.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-namespace sateen {
+namespace sateen::photon_transfer_test {
 namespace {
 
 constexpr double kGain = 0.5;
@@ -124,4 +124,4 @@ TEST(TransferPoints, PairsAreOfOneExposureAndOfUnsaturatedSites) {
 }
 
 }  // namespace
-}  // namespace sateen
+}  // namespace sateen::photon_transfer_test

@@ -1,11 +1,11 @@
-#include "calibration/pose.h"
+#include "calibration/lens/pose.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "tests/calibration/synthetic_boards.h"
 
-namespace sateen {
+namespace sateen::pose_test {
 namespace {
 
 using namespace sateen::testing;
@@ -134,4 +134,4 @@ TEST(FitPose, ErrorsSayWhatToDo) {
 }
 
 }  // namespace
-}  // namespace sateen
+}  // namespace sateen::pose_test

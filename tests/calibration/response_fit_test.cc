@@ -1,4 +1,4 @@
-#include "calibration/response_fit.h"
+#include "calibration/response/response_fit.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -7,7 +7,7 @@
 
 #include "tests/calibration/synthetic_chart.h"
 
-namespace sateen {
+namespace sateen::response_fit_test {
 namespace {
 
 using namespace sateen::testing;
@@ -328,4 +328,4 @@ TEST(ResponseFit, ErrorsSayWhatIsMissing) {
 }
 
 }  // namespace
-}  // namespace sateen
+}  // namespace sateen::response_fit_test

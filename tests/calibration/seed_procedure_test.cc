@@ -1,15 +1,15 @@
-#include "calibration/seed_procedure.h"
+#include "calibration/lights/seed_procedure.h"
 
 #include <fmt/core.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "calibration/flatness.h"
-#include "calibration/light_fit.h"
+#include "calibration/lights/light_fit.h"
+#include "calibration/sheet/flatness.h"
 #include "simulation/rigs.h"
 #include "tests/calibration/synthetic_sheets.h"
 
-namespace sateen {
+namespace sateen::seed_procedure_test {
 namespace {
 
 using sateen::testing::SamplesOf;
@@ -239,4 +239,4 @@ TEST(SeedProcedure, OptionsAreChecked) {
 }
 
 }  // namespace
-}  // namespace sateen
+}  // namespace sateen::seed_procedure_test

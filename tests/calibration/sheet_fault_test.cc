@@ -1,4 +1,4 @@
-#include "calibration/sheet_fault.h"
+#include "calibration/sheet/sheet_fault.h"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 
 #include "tests/calibration/synthetic_sheets.h"
 
-namespace sateen {
+namespace sateen::sheet_fault_test {
 namespace {
 
 using namespace sateen::testing;
@@ -108,4 +108,4 @@ TEST(FindSheetFault, NamesTheLightUnderWhichMostShows) {
 }
 
 }  // namespace
-}  // namespace sateen
+}  // namespace sateen::sheet_fault_test

@@ -1,4 +1,4 @@
-#include "calibration/sheet_pose.h"
+#include "calibration/sheet/sheet_pose.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -12,7 +12,7 @@
 #include "simulation/rigs.h"
 #include "simulation/sensor.h"
 
-namespace sateen {
+namespace sateen::sheet_pose_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -226,4 +226,4 @@ TEST_F(FitSheetPoseTest, LargePicturesAreShrunk) {
 }
 
 }  // namespace
-}  // namespace sateen
+}  // namespace sateen::sheet_pose_test

@@ -4,12 +4,12 @@
 #include <cmath>
 #include <fstream>
 
-#include "calibration/spheres.h"
+#include "calibration/spheres/spheres.h"
 #include "core/angle.h"
 #include "imaging/image_io.h"
 #include "tests/testing/files.h"
 
-namespace sateen {
+namespace sateen::spheres_photos_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -153,4 +153,4 @@ TEST(SpheresPhotos, HarvardDirections) {
 }
 
 }  // namespace
-}  // namespace sateen
+}  // namespace sateen::spheres_photos_test

@@ -1,4 +1,4 @@
-#include "calibration/spheres.h"
+#include "calibration/spheres/spheres.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -9,7 +9,7 @@
 #include "core/angle.h"
 #include "tests/calibration/synthetic_spheres.h"
 
-namespace sateen {
+namespace sateen::spheres_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -181,4 +181,4 @@ TEST(Spheres, ErrorsNameTheFrame) {
 }
 
 }  // namespace
-}  // namespace sateen
+}  // namespace sateen::spheres_test

@@ -3,7 +3,7 @@
 #include <Eigen/Geometry>
 #include <vector>
 
-#include "calibration/board_find.h"
+#include "calibration/print/board_find.h"
 #include "core/angle.h"
 #include "rig/camera.h"
 #include "simulation/random.h"

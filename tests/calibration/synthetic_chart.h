@@ -9,7 +9,7 @@
 #include <optional>
 #include <vector>
 
-#include "calibration/chart_readings.h"
+#include "calibration/response/chart_readings.h"
 #include "simulation/random.h"
 
 namespace sateen::testing {

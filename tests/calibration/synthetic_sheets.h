@@ -1,6 +1,6 @@
 #pragma once
 
-#include "cli/synthetic_sheets.h"
+#include "pipelines/calibrate/synthetic_sheets.h"
 
 namespace sateen::testing {
 

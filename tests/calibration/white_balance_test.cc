@@ -1,10 +1,10 @@
-#include "calibration/white_balance.h"
+#include "calibration/response/white_balance.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-namespace sateen {
+namespace sateen::white_balance_test {
 namespace {
 
 // Signals of one patch in one frame, each known to `relative_sd`.
@@ -94,4 +94,4 @@ TEST(BalanceLights, APatchWithoutAColourIsNotUsed) {
 }
 
 }  // namespace
-}  // namespace sateen
+}  // namespace sateen::white_balance_test

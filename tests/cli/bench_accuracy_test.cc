@@ -1,4 +1,4 @@
-#include "cli/bench_accuracy.h"
+#include "cli/bench/bench_accuracy.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -6,8 +6,9 @@
 #include "tests/cli/cli_runner.h"
 #include "tests/imaging/pictures.h"
 #include "tests/testing/files.h"
+#include "tests/testing/places.h"
 
-namespace sateen {
+namespace sateen::bench_accuracy_test {
 namespace {
 
 using sateen::testing::ReadBytes;
@@ -42,8 +43,8 @@ TEST(BenchAccuracy, ComparesColoursWithMosaicsAndWritesThePage) {
   const std::string plot = (folder.Path() / "images-accuracy.svg").string();
   const RunResult run =
       BenchAccuracy({"--data", folder.Path().string(), "--scene",
-                     std::string(SATEEN_SOURCE_DIR) + "/samples/scenes/twill-small.json",
-                     "--repeats", "1", "--json", "--markdown", page, "--plot", plot});
+                     testing::SourceDir() + "/samples/scenes/twill-small.json", "--repeats", "1",
+                     "--json", "--markdown", page, "--plot", plot});
   ASSERT_EQ(run.exit_status, 0) << run.log;
   const nlohmann::json report = run.Json();
   EXPECT_EQ(report.at("skipped").size(), 5U);
@@ -61,4 +62,4 @@ TEST(BenchAccuracy, ComparesColoursWithMosaicsAndWritesThePage) {
 }
 
 }  // namespace
-}  // namespace sateen
+}  // namespace sateen::bench_accuracy_test

@@ -1,11 +1,11 @@
-#include "cli/bench_calibrate.h"
+#include "cli/bench/bench_calibrate.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "tests/cli/cli_runner.h"
 
-namespace sateen {
+namespace sateen::bench_calibrate_test {
 namespace {
 
 using sateen::testing::RunResult;
@@ -40,4 +40,4 @@ TEST(BenchCalibrate, MeasuresTheWholeChain) {
 }
 
 }  // namespace
-}  // namespace sateen
+}  // namespace sateen::bench_calibrate_test

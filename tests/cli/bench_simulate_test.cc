@@ -1,4 +1,4 @@
-#include "cli/bench_simulate.h"
+#include "cli/bench/bench_simulate.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,7 +8,7 @@
 #include "tests/cli/cli_runner.h"
 #include "tests/testing/files.h"
 
-namespace sateen {
+namespace sateen::bench_simulate_test {
 namespace {
 
 using sateen::testing::RunResult;
@@ -68,4 +68,4 @@ TEST(BenchSimulate, DrawsEverySwitch) {
 }
 
 }  // namespace
-}  // namespace sateen
+}  // namespace sateen::bench_simulate_test

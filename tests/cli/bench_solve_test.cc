@@ -1,4 +1,4 @@
-#include "cli/bench_solve.h"
+#include "cli/bench/bench_solve.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -9,7 +9,7 @@
 #include "tests/cli/cli_runner.h"
 #include "tests/testing/files.h"
 
-namespace sateen {
+namespace sateen::bench_solve_test {
 namespace {
 
 using sateen::testing::RunResult;
@@ -53,4 +53,4 @@ TEST(BenchSolve, DrawsThePlot) {
 }
 
 }  // namespace
-}  // namespace sateen
+}  // namespace sateen::bench_solve_test

@@ -5,13 +5,13 @@
 
 #include <filesystem>
 
-#include "calibration/board_find.h"
+#include "calibration/print/board_find.h"
 #include "targets/page.h"
 #include "tests/calibration/test_pictures.h"
 #include "tests/cli/cli_runner.h"
 #include "tests/testing/files.h"
 
-namespace sateen {
+namespace sateen::board_test {
 namespace {
 
 using sateen::testing::GreyFile;
@@ -72,4 +72,4 @@ TEST(BoardPrint, FilesAreWrittenByTheirEnding) {
 }
 
 }  // namespace
-}  // namespace sateen
+}  // namespace sateen::board_test

@@ -4,13 +4,14 @@
 #include <filesystem>
 #include <fstream>
 
-#include "cli/calibrate_check.h"
-#include "cli/calibrate_lights.h"
+#include "cli/calibrate/calibrate_check.h"
+#include "cli/calibrate/calibrate_lights.h"
 #include "rig/rig.h"
 #include "tests/cli/cli_runner.h"
 #include "tests/testing/files.h"
+#include "tests/testing/places.h"
 
-namespace sateen {
+namespace sateen::calibrate_border_test {
 namespace {
 
 using sateen::testing::RunResult;
@@ -24,7 +25,7 @@ namespace fs = std::filesystem;
 constexpr const char* kBorder = "sheet:190x142mm:9mm";
 
 const fs::path& Samples() {
-  static const fs::path samples = fs::path(SATEEN_SOURCE_DIR) / "samples";
+  static const fs::path samples = fs::path(testing::SourceDir()) / "samples";
   return samples;
 }
 
@@ -207,4 +208,4 @@ TEST_F(CalibrateBorder, WhatIsWrongWithABorderIsNamedAndNothingIsWritten) {
 }
 
 }  // namespace
-}  // namespace sateen
+}  // namespace sateen::calibrate_border_test

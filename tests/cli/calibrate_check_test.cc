@@ -1,4 +1,4 @@
-#include "cli/calibrate_check.h"
+#include "cli/calibrate/calibrate_check.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,8 +8,9 @@
 
 #include "tests/cli/cli_runner.h"
 #include "tests/testing/files.h"
+#include "tests/testing/places.h"
 
-namespace sateen {
+namespace sateen::calibrate_check_test {
 namespace {
 
 using sateen::testing::RunResult;
@@ -27,7 +28,7 @@ class CalibrateCheckCommand : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
     folder_ = new TempFolder();
-    std::ifstream sample(fs::path(SATEEN_SOURCE_DIR) / "samples" / "rigs" / "ring10.json");
+    std::ifstream sample(fs::path(testing::SourceDir()) / "samples" / "rigs" / "ring10.json");
     rig_ = nlohmann::json::parse(sample);
     rig_["camera"]["size_px"] = {480, 360};
     rig_["camera"]["k"] = {1464.0, 1464.0, 239.5, 179.5};
@@ -210,4 +211,4 @@ TEST_F(CalibrateCheckCommand, OptionsAreChecked) {
 }
 
 }  // namespace
-}  // namespace sateen
+}  // namespace sateen::calibrate_check_test

@@ -1,4 +1,4 @@
-#include "cli/calibrate_lens.h"
+#include "cli/calibrate/calibrate_lens.h"
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -6,14 +6,14 @@
 
 #include <filesystem>
 
-#include "cli/calibrate_pose.h"
+#include "cli/calibrate/calibrate_pose.h"
 #include "core/file_io.h"
 #include "imaging/image_io.h"
 #include "rig/rig.h"
 #include "tests/cli/cli_runner.h"
 #include "tests/testing/files.h"
 
-namespace sateen {
+namespace sateen::calibrate_lens_test {
 namespace {
 
 using namespace sateen::testing;
@@ -329,4 +329,4 @@ TEST(CalibrateLensOfPhotographs, CharucoOfWhichPhotographsShowParts) {
 }
 
 }  // namespace
-}  // namespace sateen
+}  // namespace sateen::calibrate_lens_test

@@ -1,4 +1,4 @@
-#include "cli/calibrate_lights.h"
+#include "cli/calibrate/calibrate_lights.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -6,15 +6,16 @@
 #include <filesystem>
 #include <fstream>
 
-#include "calibration/flatness.h"
+#include "calibration/sheet/flatness.h"
 #include "core/angle.h"
 #include "imaging/image_io.h"
 #include "rig/rig.h"
-#include "scanner/sheet_reader.h"
+#include "scanner/sessions/sheet_reader.h"
 #include "tests/cli/cli_runner.h"
 #include "tests/testing/files.h"
+#include "tests/testing/places.h"
 
-namespace sateen {
+namespace sateen::calibrate_lights_test {
 namespace {
 
 using sateen::testing::RunResult;
@@ -37,7 +38,7 @@ class CalibrateLightsCommand : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
     folder_ = new TempFolder();
-    std::ifstream sample(fs::path(SATEEN_SOURCE_DIR) / "samples" / "rigs" / "ring10.json");
+    std::ifstream sample(fs::path(testing::SourceDir()) / "samples" / "rigs" / "ring10.json");
     nlohmann::json rig = nlohmann::json::parse(sample);
     rig["camera"]["size_px"] = {480, 360};
     rig["camera"]["k"] = {1464.0, 1464.0, 239.5, 179.5};
@@ -272,4 +273,4 @@ TEST_F(CalibrateLightsCommand, OptionsAreChecked) {
 }
 
 }  // namespace
-}  // namespace sateen
+}  // namespace sateen::calibrate_lights_test

@@ -6,7 +6,7 @@
 #include "rig/rig.h"
 #include "tests/cli/simulated_chart.h"
 
-namespace sateen {
+namespace sateen::calibrate_response_errors_test {
 namespace {
 
 using namespace sateen::testing;
@@ -135,4 +135,4 @@ TEST_F(CalibrateResponseErrors, OptionsAreChecked) {
 }
 
 }  // namespace
-}  // namespace sateen
+}  // namespace sateen::calibrate_response_errors_test

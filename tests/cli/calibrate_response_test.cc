@@ -3,12 +3,12 @@
 
 #include <filesystem>
 
-#include "cli/calibrate_lights.h"
+#include "cli/calibrate/calibrate_lights.h"
 #include "imaging/image_io.h"
 #include "rig/rig.h"
 #include "tests/cli/simulated_chart.h"
 
-namespace sateen {
+namespace sateen::calibrate_response_test {
 namespace {
 
 using namespace sateen::testing;
@@ -205,4 +205,4 @@ TEST_F(CalibrateResponseCommand, AChartThatLiesAskewAndTheOtherWayRoundIsFound) 
 }
 
 }  // namespace
-}  // namespace sateen
+}  // namespace sateen::calibrate_response_test

@@ -1,4 +1,4 @@
-#include "cli/calibrate_spheres.h"
+#include "cli/calibrate/calibrate_spheres.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -15,7 +15,7 @@
 #include "tests/cli/cli_runner.h"
 #include "tests/testing/files.h"
 
-namespace sateen {
+namespace sateen::calibrate_spheres_test {
 namespace {
 
 using sateen::testing::AngleDeg;
@@ -243,4 +243,4 @@ TEST_F(CalibrateSpheresCommand, BadPhotographsAreNamed) {
 }
 
 }  // namespace
-}  // namespace sateen
+}  // namespace sateen::calibrate_spheres_test

@@ -3,10 +3,10 @@
 #include <gmock/gmock.h>
 
 #include "tests/cli/cli_runner.h"
-#include "tests/scanner/fake_board.h"
+#include "tests/scanner/devices/fake_board.h"
 #include "tests/testing/files.h"
 
-namespace sateen {
+namespace sateen::devices_test {
 namespace {
 
 using testing::FakeBoard;
@@ -93,4 +93,4 @@ TEST(Devices, CamerasAreListedWithWhatIsMissing) {
 }
 
 }  // namespace
-}  // namespace sateen
+}  // namespace sateen::devices_test

@@ -6,9 +6,10 @@
 #include <sstream>
 
 #include "tests/cli/cli_runner.h"
-#include "tests/scanner/fake_board.h"
+#include "tests/scanner/devices/fake_board.h"
+#include "tests/testing/places.h"
 
-namespace sateen {
+namespace sateen::light_test {
 namespace {
 
 using testing::FakeBoard;
@@ -69,7 +70,7 @@ TEST(Light, ThatReachesItsLimitIsAnError) {
 
 TEST(Light, IsFoundByItsNameInTheRig) {
   FakeBoard fake;
-  const std::string rig = std::string(SATEEN_SOURCE_DIR) + "/samples/rigs/ring10.json";
+  const std::string rig = testing::SourceDir() + "/samples/rigs/ring10.json";
   EXPECT_EQ(Light(fake, {"led-4", "--rig", rig, "--for", "1s"}).exit_status, 0);
   EXPECT_EQ(fake.lights_set.at(0).channel, 4);
   FakeBoard untouched;  // an Uno restarts when its port is opened
@@ -145,4 +146,4 @@ TEST(Light, ABoardThatIsUnpluggedIsExitStatus5) {
 }
 
 }  // namespace
-}  // namespace sateen
+}  // namespace sateen::light_test

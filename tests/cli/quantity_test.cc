@@ -2,7 +2,7 @@
 
 #include <gmock/gmock.h>
 
-namespace sateen::cli {
+namespace sateen::cli::quantity_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -39,4 +39,4 @@ TEST(Quantity, WritesThemForPeople) {
 }
 
 }  // namespace
-}  // namespace sateen::cli
+}  // namespace sateen::cli::quantity_test

@@ -12,10 +12,10 @@
 #include "cli/light.h"
 #include "scanner/daemon/http_client.h"
 #include "tests/cli/cli_runner.h"
-#include "tests/daemon/daemon_fakes.h"
+#include "tests/scanner/daemon/daemon_fakes.h"
 #include "tests/testing/files.h"
 
-namespace sateen {
+namespace sateen::serve_test {
 namespace {
 
 using testing::FakeBoard;
@@ -159,4 +159,4 @@ TEST(Serve, ASecondDaemonIsRefused) {
 }
 
 }  // namespace
-}  // namespace sateen
+}  // namespace sateen::serve_test

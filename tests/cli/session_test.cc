@@ -6,9 +6,9 @@
 
 #include "core/sha256.h"
 #include "tests/cli/cli_runner.h"
-#include "tests/scanner/captures.h"
+#include "tests/scanner/sessions/captures.h"
 
-namespace sateen {
+namespace sateen::session_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -96,4 +96,4 @@ TEST(SessionVerify, AFolderThatIsNotThereIsExitStatus4) {
 TEST(SessionVerify, NeedsASession) { EXPECT_EQ(Verify({}).exit_status, 2); }
 
 }  // namespace
-}  // namespace sateen
+}  // namespace sateen::session_test

@@ -8,11 +8,12 @@
 
 #include "imaging/raw.h"
 #include "rig/rig.h"
-#include "scanner/session.h"
+#include "scanner/sessions/session.h"
 #include "tests/cli/cli_runner.h"
 #include "tests/testing/files.h"
+#include "tests/testing/places.h"
 
-namespace sateen {
+namespace sateen::simulate_test {
 namespace {
 
 using sateen::testing::RunResult;
@@ -25,7 +26,7 @@ using ::testing::Not;
 namespace fs = std::filesystem;
 
 std::string SampleScene(const std::string& name) {
-  return (fs::path(SATEEN_SOURCE_DIR) / "samples" / "scenes" / name).string();
+  return (fs::path(testing::SourceDir()) / "samples" / "scenes" / name).string();
 }
 
 TEST(SimulateCommand, ListsEverySampleSceneWithItsTitle) {
@@ -42,7 +43,7 @@ TEST(SimulateCommand, ListsEverySampleSceneWithItsTitle) {
 class SmallScene {
  public:
   explicit SmallScene(const std::string& rest) {
-    std::ifstream sample(fs::path(SATEEN_SOURCE_DIR) / "samples" / "rigs" / "ring10.json");
+    std::ifstream sample(fs::path(testing::SourceDir()) / "samples" / "rigs" / "ring10.json");
     nlohmann::json rig = nlohmann::json::parse(sample);
     rig["camera"]["size_px"] = {160, 120};
     rig["camera"]["k"] = {488.0, 488.0, 79.5, 59.5};
@@ -174,7 +175,7 @@ TEST(SimulateCommand, AMissingHeightMapIsNamed) {
 TEST(SimulateCommand, ALightThatNoFileCanBeNamedAfterIsRefused) {
   const TempFolder folder;
   const std::string scene = (folder.Path() / "scene.json").string();
-  std::ifstream sample(fs::path(SATEEN_SOURCE_DIR) / "samples" / "rigs" / "ring10.json");
+  std::ifstream sample(fs::path(testing::SourceDir()) / "samples" / "rigs" / "ring10.json");
   nlohmann::json rig = nlohmann::json::parse(sample);
   rig["lights"][3]["name"] = "../x";
   WriteText(folder.Path() / "rig.json", rig.dump());
@@ -222,7 +223,7 @@ TEST(SimulateCommand, TheFolderOfTheSceneIsNoPlaceForTheSession) {
 
 TEST(SimulateCommand, ALightNamedAsTheDarkFrameIsRefused) {
   const SmallScene scene(kFlat);
-  std::ifstream sample(fs::path(SATEEN_SOURCE_DIR) / "samples" / "rigs" / "ring10.json");
+  std::ifstream sample(fs::path(testing::SourceDir()) / "samples" / "rigs" / "ring10.json");
   nlohmann::json rig = nlohmann::json::parse(sample);
   rig["lights"][3]["name"] = "dark";
   WriteText(fs::path(scene.Out()).parent_path() / "rig.json", rig.dump());
@@ -238,7 +239,7 @@ TEST(SimulateCommand, ALightNamedAsTheDarkFrameIsRefused) {
 // another way, so a reading may differ by one step, rarely.
 TEST(SimulateCommand, TheKeptSessionIsWhatItsSceneGives) {
   const TempFolder folder;
-  const fs::path samples = fs::path(SATEEN_SOURCE_DIR) / "samples";
+  const fs::path samples = fs::path(testing::SourceDir()) / "samples";
   const fs::path kept = samples / "sessions" / "twill-small";
   const RunResult run = Simulate(
       {(samples / "scenes" / "twill-small.json").string(), "-o", (folder.Path() / "out").string()});
@@ -354,4 +355,4 @@ TEST(SimulateCommand, TheSameSceneGivesTheSameBytes) {
 }
 
 }  // namespace
-}  // namespace sateen
+}  // namespace sateen::simulate_test

@@ -5,9 +5,10 @@
 #include <filesystem>
 #include <fstream>
 
-#include "cli/calibrate_response.h"
+#include "cli/calibrate/calibrate_response.h"
 #include "tests/cli/cli_runner.h"
 #include "tests/testing/files.h"
+#include "tests/testing/places.h"
 
 namespace sateen::testing {
 
@@ -24,7 +25,7 @@ inline nlohmann::json ReadJson(const std::filesystem::path& path) {
 }
 
 inline std::string ChartFile() {
-  return (std::filesystem::path(SATEEN_SOURCE_DIR) / "samples" / "charts" / "neutral.json")
+  return (std::filesystem::path(testing::SourceDir()) / "samples" / "charts" / "neutral.json")
       .string();
 }
 
@@ -39,7 +40,7 @@ class SimulatedChart : public ::testing::Test {
  protected:
   static void MakeRig() {
     folder_ = new TempFolder();
-    nlohmann::json rig = ReadJson(std::filesystem::path(SATEEN_SOURCE_DIR) / "samples" / "rigs" /
+    nlohmann::json rig = ReadJson(std::filesystem::path(testing::SourceDir()) / "samples" / "rigs" /
                                   "ring10-white-leds.json");
     const nlohmann::json all = rig["lights"];
     rig["lights"] = {all[0], all[3], all[6]};

@@ -11,7 +11,7 @@
 #include "tests/cli/cli_runner.h"
 #include "tests/testing/files.h"
 
-namespace sateen {
+namespace sateen::solve_height_test {
 namespace {
 
 using namespace sateen::testing;  // NOLINT(google-build-using-namespace): the cases of this file
@@ -143,4 +143,4 @@ TEST_F(SolveHeight, IsRefusedWhereNoLightTellsOfItOrOneIsTooLow) {
 }
 
 }  // namespace
-}  // namespace sateen
+}  // namespace sateen::solve_height_test

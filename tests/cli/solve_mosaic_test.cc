@@ -7,8 +7,9 @@
 #include "tests/cli/cli_runner.h"
 #include "tests/imaging/pictures.h"
 #include "tests/testing/files.h"
+#include "tests/testing/places.h"
 
-namespace sateen {
+namespace sateen::solve_mosaic_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -25,7 +26,7 @@ class SolveMosaic : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
     folder_ = new TempFolder();
-    const fs::path scene = fs::path(SATEEN_SOURCE_DIR) / "samples/scenes/twill-small.json";
+    const fs::path scene = fs::path(testing::SourceDir()) / "samples/scenes/twill-small.json";
     const RunResult run = Simulate({scene.string(), "-o", Path("session")});
     ASSERT_EQ(run.exit_status, 0) << run.log;
     fs::copy(Path("session"), Path("without-truth"), fs::copy_options::recursive);
@@ -99,7 +100,7 @@ TEST_F(SolveMosaic, ByTheReferenceItIsTheSame) {
 }
 
 TEST_F(SolveMosaic, WhatHasNoMosaicsIsSolvedFromColoursOrRefused) {
-  const fs::path scene = fs::path(SATEEN_SOURCE_DIR) / "samples/scenes/twill-small.json";
+  const fs::path scene = fs::path(testing::SourceDir()) / "samples/scenes/twill-small.json";
   ASSERT_EQ(Simulate({scene.string(), "-o", Path("linear"), "--linear"}).exit_status, 0);
   const RunResult by_default = Solve({Path("linear"), "-o", Path("linear-maps"), "--json"});
   ASSERT_EQ(by_default.exit_status, 0) << by_default.log;
@@ -112,4 +113,4 @@ TEST_F(SolveMosaic, WhatHasNoMosaicsIsSolvedFromColoursOrRefused) {
 }
 
 }  // namespace
-}  // namespace sateen
+}  // namespace sateen::solve_mosaic_test

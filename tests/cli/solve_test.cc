@@ -13,7 +13,7 @@
 #include "tests/testing/files.h"
 #include "tests/testing/full_disk.h"
 
-namespace sateen {
+namespace sateen::solve_test {
 namespace {
 
 using sateen::testing::DataDir;
@@ -440,4 +440,4 @@ TEST_F(RealData, EightBitPhotographsAreLinearisedWithAWarning) {
 }
 
 }  // namespace
-}  // namespace sateen
+}  // namespace sateen::solve_test

@@ -6,7 +6,7 @@
 #include "tests/testing/files.h"
 
 // What is made of a session and the maps of its solve.
-namespace sateen {
+namespace sateen::solved_session_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -106,4 +106,4 @@ TEST_F(SolvedSession, IsComparedWithTheTruthThatIsNamed) {
 }
 
 }  // namespace
-}  // namespace sateen
+}  // namespace sateen::solved_session_test

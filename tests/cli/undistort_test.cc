@@ -7,7 +7,7 @@
 #include "tests/cli/cli_runner.h"
 #include "tests/testing/files.h"
 
-namespace sateen {
+namespace sateen::undistort_test {
 namespace {
 
 using namespace sateen::testing;
@@ -86,4 +86,4 @@ TEST(SolveUndistort, NeedsACamera) {
 }
 
 }  // namespace
-}  // namespace sateen
+}  // namespace sateen::undistort_test

@@ -5,7 +5,7 @@
 #include <csignal>
 #include <cstdlib>
 
-namespace sateen {
+namespace sateen::interrupt_test {
 namespace {
 
 using ::testing::ExitedWithCode;
@@ -47,4 +47,4 @@ TEST_P(InterruptDeathTest, SignalThatWasIgnoredStaysIgnored) {
 INSTANTIATE_TEST_SUITE_P(Signals, InterruptDeathTest, ::testing::Values(SIGINT, SIGTERM));
 
 }  // namespace
-}  // namespace sateen
+}  // namespace sateen::interrupt_test

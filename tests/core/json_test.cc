@@ -8,7 +8,7 @@
 
 #include "tests/testing/files.h"
 
-namespace sateen {
+namespace sateen::json_test {
 namespace {
 
 using ::testing::ElementsAre;
@@ -234,4 +234,4 @@ TEST(ReadJsonFile, MissingFileIsAnIoError) {
 }
 
 }  // namespace
-}  // namespace sateen
+}  // namespace sateen::json_test

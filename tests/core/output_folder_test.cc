@@ -14,7 +14,7 @@
 #include "tests/testing/files.h"
 #include "tests/testing/full_disk.h"
 
-namespace sateen {
+namespace sateen::output_folder_test {
 namespace {
 
 using ::testing::ElementsAre;
@@ -316,4 +316,4 @@ TEST(ReadFileBytes, NamesThePathAndTheReason) {
 }
 
 }  // namespace
-}  // namespace sateen
+}  // namespace sateen::output_folder_test

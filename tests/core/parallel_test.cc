@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-namespace sateen {
+namespace sateen::parallel_test {
 namespace {
 
 using ::testing::Each;
@@ -112,4 +112,4 @@ TEST(Task, ThreadCountIsAtLeastOne) {
 }
 
 }  // namespace
-}  // namespace sateen
+}  // namespace sateen::parallel_test

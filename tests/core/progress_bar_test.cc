@@ -12,7 +12,7 @@
 #include <thread>
 #include <vector>
 
-namespace sateen {
+namespace sateen::progress_bar_test {
 namespace {
 
 using ::testing::EndsWith;
@@ -142,4 +142,4 @@ TEST(ProgressBar, NothingIsClearedWhereNothingWasDrawn) {
 }
 
 }  // namespace
-}  // namespace sateen
+}  // namespace sateen::progress_bar_test

@@ -5,7 +5,7 @@
 
 #include "tests/testing/files.h"
 
-namespace sateen {
+namespace sateen::sha256_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -43,4 +43,4 @@ TEST(Sha256OfFile, NamesTheFileThatIsMissing) {
 }
 
 }  // namespace
-}  // namespace sateen
+}  // namespace sateen::sha256_test

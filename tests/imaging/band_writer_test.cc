@@ -11,7 +11,7 @@
 #include "tests/testing/files.h"
 #include "tests/testing/full_disk.h"
 
-namespace sateen {
+namespace sateen::band_writer_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -86,4 +86,4 @@ TEST(BandWriter, TellsOfADiskThatFillsInAnyBand) {
 }
 
 }  // namespace
-}  // namespace sateen
+}  // namespace sateen::band_writer_test

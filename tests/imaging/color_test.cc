@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-namespace sateen {
+namespace sateen::color_test {
 namespace {
 
 TEST(LinearFromSrgb, GivesTheStandardsValues) {
@@ -48,4 +48,4 @@ TEST(Luminance, OfWhiteIsOne) {
 }
 
 }  // namespace
-}  // namespace sateen
+}  // namespace sateen::color_test

@@ -10,7 +10,7 @@
 #include "tests/imaging/dng.h"
 #include "tests/testing/files.h"
 
-namespace sateen {
+namespace sateen::demosaic_test {
 namespace {
 
 using testing::kBayerOrders;
@@ -150,4 +150,4 @@ TEST(Demosaic, ShowsTheGreysOfARealChartInOrder) {
 }
 
 }  // namespace
-}  // namespace sateen
+}  // namespace sateen::demosaic_test

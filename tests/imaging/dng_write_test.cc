@@ -16,7 +16,7 @@
 #include "tests/testing/files.h"
 #include "tests/testing/full_disk.h"
 
-namespace sateen {
+namespace sateen::dng_write_test {
 namespace {
 
 using testing::FullDisk;
@@ -322,4 +322,4 @@ TEST_F(WriteDngTest, AFullDiskLeavesTheFormerFile) {
 }
 
 }  // namespace
-}  // namespace sateen
+}  // namespace sateen::dng_write_test

@@ -9,7 +9,7 @@
 #include "tests/imaging/dng.h"
 #include "tests/testing/files.h"
 
-namespace sateen {
+namespace sateen::file_check_test {
 namespace {
 
 using testing::Append;
@@ -111,4 +111,4 @@ TEST(ReadFileHead, TellsTheStartAndTheLength) {
 }
 
 }  // namespace
-}  // namespace sateen
+}  // namespace sateen::file_check_test

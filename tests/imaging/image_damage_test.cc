@@ -8,7 +8,7 @@
 #include "tests/imaging/pictures.h"
 #include "tests/testing/files.h"
 
-namespace sateen {
+namespace sateen::image_damage_test {
 namespace {
 
 using testing::FileKind;
@@ -156,4 +156,4 @@ TEST(ReadPhoto, RefusesMoreThanTwoToThe31Pixels) {
 }
 
 }  // namespace
-}  // namespace sateen
+}  // namespace sateen::image_damage_test

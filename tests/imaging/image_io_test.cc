@@ -12,7 +12,7 @@
 #include "tests/imaging/pictures.h"
 #include "tests/testing/files.h"
 
-namespace sateen {
+namespace sateen::image_io_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -248,4 +248,4 @@ TEST(ReadPhoto, ReadsEveryPictureOfTheRealData) {
 }
 
 }  // namespace
-}  // namespace sateen
+}  // namespace sateen::image_io_test

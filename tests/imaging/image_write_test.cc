@@ -10,7 +10,7 @@
 #include "tests/testing/files.h"
 #include "tests/testing/full_disk.h"
 
-namespace sateen {
+namespace sateen::image_write_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -122,4 +122,4 @@ TEST(Writers, NoticeThatTheDiskIsFullAtAnyByte) {
 }
 
 }  // namespace
-}  // namespace sateen
+}  // namespace sateen::image_write_test

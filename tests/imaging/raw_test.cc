@@ -10,7 +10,7 @@
 #include "tests/imaging/dng.h"
 #include "tests/testing/files.h"
 
-namespace sateen {
+namespace sateen::raw_test {
 namespace {
 
 using testing::DngBytes;
@@ -222,4 +222,4 @@ TEST(ReadRawMosaic, RefusesTheChartCutShort) {
 }
 
 }  // namespace
-}  // namespace sateen
+}  // namespace sateen::raw_test

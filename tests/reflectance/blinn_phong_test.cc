@@ -10,7 +10,7 @@
 #include "reflectance/microfacet.h"
 #include "tests/reflectance/furnace.h"
 
-namespace sateen {
+namespace sateen::blinn_phong_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -192,4 +192,4 @@ TEST(BlinnPhong, ErrorsNameTheFieldAndItsRange) {
 }
 
 }  // namespace
-}  // namespace sateen
+}  // namespace sateen::blinn_phong_test

@@ -9,7 +9,7 @@
 #include "reflectance/environment_brdf.h"
 #include "tests/reflectance/furnace.h"
 
-namespace sateen {
+namespace sateen::diffuse_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -180,4 +180,4 @@ TEST(Diffuse, ErrorsNameTheFieldAndItsRange) {
 }
 
 }  // namespace
-}  // namespace sateen
+}  // namespace sateen::diffuse_test

@@ -5,7 +5,7 @@
 #include "reflectance/specular.h"
 #include "tests/reflectance/furnace.h"
 
-namespace sateen {
+namespace sateen::environment_brdf_test {
 namespace {
 
 const Eigen::Vector3d kPlastic = Eigen::Vector3d::Constant(0.04);
@@ -91,4 +91,4 @@ TEST(EnvironmentBrdf, CosinesOutOfRangeAreClamped) {
 }
 
 }  // namespace
-}  // namespace sateen
+}  // namespace sateen::environment_brdf_test

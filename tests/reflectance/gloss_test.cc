@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-namespace sateen {
+namespace sateen::gloss_test {
 namespace {
 
 TEST(Gloss, Row1_01_NewAndOldMaps) {
@@ -59,4 +59,4 @@ TEST(Gloss, GltfRoughnessIsTheRootOfAlpha) {
 }
 
 }  // namespace
-}  // namespace sateen
+}  // namespace sateen::gloss_test

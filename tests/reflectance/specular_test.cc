@@ -8,7 +8,7 @@
 
 #include "reflectance/microfacet.h"
 
-namespace sateen {
+namespace sateen::specular_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -163,4 +163,4 @@ TEST(Specular, ErrorsNameTheFieldAndItsRange) {
 }
 
 }  // namespace
-}  // namespace sateen
+}  // namespace sateen::specular_test

@@ -10,7 +10,7 @@
 #include "core/angle.h"
 #include "rig/table_grid.h"
 
-namespace sateen {
+namespace sateen::camera_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -245,4 +245,4 @@ TEST(TableGrid, LensThatNoGridFollowsIsRefused) {
 }
 
 }  // namespace
-}  // namespace sateen
+}  // namespace sateen::camera_test

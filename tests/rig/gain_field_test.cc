@@ -10,7 +10,7 @@
 
 #include "rig/light.h"
 
-namespace sateen {
+namespace sateen::gain_field_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -164,4 +164,4 @@ TEST(GainField, ValidateNamesTheFieldOutOfRange) {
 }
 
 }  // namespace
-}  // namespace sateen
+}  // namespace sateen::gain_field_test

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <limits>
 
-namespace sateen {
+namespace sateen::light_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -140,4 +140,4 @@ TEST(Light, ValidateAcceptsDirectionsRoundedToFourDigits) {
 }
 
 }  // namespace
-}  // namespace sateen
+}  // namespace sateen::light_test

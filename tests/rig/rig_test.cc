@@ -9,7 +9,7 @@
 
 #include "tests/testing/files.h"
 
-namespace sateen {
+namespace sateen::rig_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -298,4 +298,4 @@ TEST(Lifted, RefusesASurfaceThatIsNotBelowLightsAndCamera) {
 }
 
 }  // namespace
-}  // namespace sateen
+}  // namespace sateen::rig_test

@@ -8,7 +8,7 @@
 #include "core/angle.h"
 #include "simulation/rigs.h"
 
-namespace sateen {
+namespace sateen::relief_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -118,4 +118,4 @@ TEST(ReliefScene, NamesTheFieldOutOfRange) {
 }
 
 }  // namespace
-}  // namespace sateen
+}  // namespace sateen::relief_test

@@ -10,7 +10,7 @@
 #include "simulation/render.h"
 #include "simulation/rigs.h"
 
-namespace sateen {
+namespace sateen::render_effects_test {
 namespace {
 
 Scene SceneOf(Result<SurfacePtr> surface, Rig rig) {
@@ -261,4 +261,4 @@ TEST(Effects, APlaneThatARayNeverMeetsIsRefused) {
 }
 
 }  // namespace
-}  // namespace sateen
+}  // namespace sateen::render_effects_test

@@ -11,7 +11,7 @@
 #include "simulation/rigs.h"
 #include "simulation/trace.h"
 
-namespace sateen {
+namespace sateen::render_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -269,4 +269,4 @@ TEST(Scene, ErrorsNameTheKeyAndItsRange) {
 }
 
 }  // namespace
-}  // namespace sateen
+}  // namespace sateen::render_test

@@ -7,7 +7,7 @@
 
 #include "simulation/random.h"
 
-namespace sateen {
+namespace sateen::sensor_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -166,4 +166,4 @@ TEST(Sensor, ErrorsNameTheFieldAndItsRange) {
 }
 
 }  // namespace
-}  // namespace sateen
+}  // namespace sateen::sensor_test

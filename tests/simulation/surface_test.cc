@@ -12,7 +12,7 @@
 #include "simulation/trace.h"
 #include "simulation/weave.h"
 
-namespace sateen {
+namespace sateen::surface_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -193,4 +193,4 @@ TEST(Surface, ErrorsNameTheFieldAndItsRange) {
 }
 
 }  // namespace
-}  // namespace sateen
+}  // namespace sateen::surface_test

@@ -7,10 +7,10 @@
 #include <random>
 
 #include "solver/ladder.h"
-#include "solver/rungs.h"
+#include "solver/robust/rungs.h"
 #include "tests/solver/ladder_cases.h"
 
-namespace sateen {
+namespace sateen::consensus_test {
 namespace {
 
 using testing::DistantRig;
@@ -283,4 +283,4 @@ TEST(Consensus, RungOneIsDoubtedAsMuchAsPixelsClimb) {
 }
 
 }  // namespace
-}  // namespace sateen
+}  // namespace sateen::consensus_test

@@ -8,7 +8,7 @@
 #include <cmath>
 #include <numbers>
 
-namespace sateen {
+namespace sateen::evaluate_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -195,4 +195,4 @@ TEST(RelativeAlbedoError, IsRelativeToTheTruthOfEachChannel) {
 }
 
 }  // namespace
-}  // namespace sateen
+}  // namespace sateen::evaluate_test

@@ -1,6 +1,6 @@
 // The fast kernel against the reference, on random stacks: the same reasons, the same normals.
 
-#include "solver/fast_kernel.h"
+#include "solver/kernels/fast_kernel.h"
 
 #include <gtest/gtest.h>
 
@@ -9,7 +9,7 @@
 
 #include "tests/solver/solver_cases.h"
 
-namespace sateen {
+namespace sateen::fast_kernel_test {
 namespace {
 
 using namespace sateen::testing;  // NOLINT(google-build-using-namespace): the cases of this file
@@ -168,4 +168,4 @@ TEST(FastKernel, AgreesWithTheReferenceWithFields) {
 TEST(FastKernel, TellsWhatItWasCompiledFor) { EXPECT_FALSE(KernelInstructionSet().empty()); }
 
 }  // namespace
-}  // namespace sateen
+}  // namespace sateen::fast_kernel_test

@@ -1,4 +1,4 @@
-#include "solver/gain_rows.h"
+#include "solver/least_squares/gain_rows.h"
 
 #include <fmt/core.h>
 #include <gtest/gtest.h>
@@ -7,7 +7,7 @@
 
 #include "tests/solver/solver_cases.h"
 
-namespace sateen {
+namespace sateen::gain_rows_test {
 namespace {
 
 // Every pixel against the spline itself, at sizes and lenses where 16 px between knots do and do not.
@@ -83,4 +83,4 @@ TEST(SolveLambertian, AFieldIsDividedOut) {
 }
 
 }  // namespace
-}  // namespace sateen
+}  // namespace sateen::gain_rows_test

@@ -9,7 +9,7 @@
 #include "tests/solver/ladder_cases.h"
 #include "tests/solver/mosaic_cases.h"
 
-namespace sateen {
+namespace sateen::height_test {
 namespace {
 
 using namespace sateen::testing;  // NOLINT(google-build-using-namespace): the cases of this file
@@ -277,4 +277,4 @@ TEST(Height, OutOfRangeIsRefusedByName) {
 }
 
 }  // namespace
-}  // namespace sateen
+}  // namespace sateen::height_test

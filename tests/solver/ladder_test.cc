@@ -8,7 +8,7 @@
 
 #include "tests/solver/ladder_cases.h"
 
-namespace sateen {
+namespace sateen::ladder_test {
 namespace {
 
 using testing::DistantRig;
@@ -228,4 +228,4 @@ TEST(SolveLadder, NamesTheOptionThatIsOutOfRange) {
 }
 
 }  // namespace
-}  // namespace sateen
+}  // namespace sateen::ladder_test

@@ -8,7 +8,7 @@
 #include "imaging/color.h"
 #include "tests/solver/solver_cases.h"
 
-namespace sateen {
+namespace sateen::lambertian_test {
 namespace {
 
 using namespace sateen::testing;  // NOLINT(google-build-using-namespace): the cases of this file
@@ -327,4 +327,4 @@ TEST(Backend, NamesGoBothWays) {
 }
 
 }  // namespace
-}  // namespace sateen
+}  // namespace sateen::lambertian_test

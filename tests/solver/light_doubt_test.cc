@@ -11,7 +11,7 @@
 #include "simulation/rigs.h"
 #include "tests/solver/ladder_cases.h"
 
-namespace sateen {
+namespace sateen::light_doubt_test {
 namespace {
 
 using testing::DistantRig;
@@ -179,4 +179,4 @@ TEST(LightDoubt, GoesIntoTheUncertaintyOfTheLadder) {
 }
 
 }  // namespace
-}  // namespace sateen
+}  // namespace sateen::light_doubt_test

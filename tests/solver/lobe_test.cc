@@ -1,4 +1,4 @@
-#include "solver/lobe.h"
+#include "solver/lobe/lobe.h"
 
 #include <gtest/gtest.h>
 
@@ -10,10 +10,10 @@
 #include <utility>
 
 #include "reflectance/specular.h"
-#include "solver/lobe_search.h"
+#include "solver/lobe/lobe_search.h"
 #include "tests/solver/ladder_cases.h"
 
-namespace sateen {
+namespace sateen::lobe_test {
 namespace {
 
 using testing::ErrorOf;
@@ -279,4 +279,4 @@ TEST(Lobe, AnyNumberOfThreadsGivesTheSameBits) {
 }
 
 }  // namespace
-}  // namespace sateen
+}  // namespace sateen::lobe_test

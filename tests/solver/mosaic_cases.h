@@ -12,7 +12,7 @@
 #include "simulation/random.h"
 #include "simulation/relief.h"
 #include "simulation/rigs.h"
-#include "solver/mosaic.h"
+#include "solver/mosaic/mosaic.h"
 #include "tests/solver/solver_cases.h"
 
 namespace sateen::testing {

@@ -3,7 +3,7 @@
 #include "solver/light_doubt.h"
 #include "tests/solver/mosaic_cases.h"
 
-namespace sateen {
+namespace sateen::mosaic_noise_test {
 namespace {
 
 using testing::CompareErrors;
@@ -126,4 +126,4 @@ TEST(MosaicNoise, ThreeLightsAndNoNeighboursTellNothingOfTheNoise) {
 }
 
 }  // namespace
-}  // namespace sateen
+}  // namespace sateen::mosaic_noise_test

@@ -1,4 +1,4 @@
-#include "solver/mosaic.h"
+#include "solver/mosaic/mosaic.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -9,7 +9,7 @@
 #include "core/angle.h"
 #include "tests/solver/mosaic_cases.h"
 
-namespace sateen {
+namespace sateen::mosaic_test {
 namespace {
 
 using testing::CompareErrors;
@@ -289,4 +289,4 @@ TEST(MosaicTest, WhatCannotBeSolvedIsRefusedInWords) {
 }
 
 }  // namespace
-}  // namespace sateen
+}  // namespace sateen::mosaic_test

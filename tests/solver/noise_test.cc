@@ -4,7 +4,7 @@
 
 #include "tests/solver/ladder_cases.h"
 
-namespace sateen {
+namespace sateen::noise_test {
 namespace {
 
 using testing::TwoRings;
@@ -51,4 +51,4 @@ TEST(NoiseOf, TakesGainAndWhiteBalanceFromTheRig) {
 }
 
 }  // namespace
-}  // namespace sateen
+}  // namespace sateen::noise_test

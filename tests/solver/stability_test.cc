@@ -8,7 +8,7 @@
 
 #include "tests/solver/solver_cases.h"
 
-namespace sateen {
+namespace sateen::stability_test {
 namespace {
 
 using namespace sateen::testing;  // NOLINT(google-build-using-namespace): the cases of this file
@@ -371,4 +371,4 @@ TEST(Stability, OneTwoAndSevenThreadsGiveTheSameBits) {
 }
 
 }  // namespace
-}  // namespace sateen
+}  // namespace sateen::stability_test

@@ -5,7 +5,7 @@
 #include "solver/ladder.h"
 #include "tests/solver/ladder_cases.h"
 
-namespace sateen {
+namespace sateen::uncertainty_test {
 namespace {
 
 using testing::DistantRig;
@@ -182,4 +182,4 @@ TEST(SolveLadder, SmoothFramesOfEightBitsAreNotWithoutNoise) {
 }
 
 }  // namespace
-}  // namespace sateen
+}  // namespace sateen::uncertainty_test

@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-namespace sateen {
+namespace sateen::undistort_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -114,4 +114,4 @@ TEST(Undistorted, WithoutDistortionNothingChanges) {
 }
 
 }  // namespace
-}  // namespace sateen
+}  // namespace sateen::undistort_test

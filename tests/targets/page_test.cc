@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-namespace sateen {
+namespace sateen::page_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -101,4 +101,4 @@ TEST(Page, SaysWhatFits) {
 }
 
 }  // namespace
-}  // namespace sateen
+}  // namespace sateen::page_test

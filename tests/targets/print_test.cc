@@ -5,7 +5,7 @@
 
 #include "targets/marker_dictionary.h"
 
-namespace sateen {
+namespace sateen::print_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -76,4 +76,4 @@ TEST(Print, NamesBothKindsOfTargets) {
 }
 
 }  // namespace
-}  // namespace sateen
+}  // namespace sateen::print_test

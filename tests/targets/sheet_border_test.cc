@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-namespace sateen {
+namespace sateen::sheet_border_test {
 namespace {
 
 using ::testing::HasSubstr;
@@ -57,4 +57,4 @@ TEST(SheetBorder, NamesWhatIsNeeded) {
 }
 
 }  // namespace
-}  // namespace sateen
+}  // namespace sateen::sheet_border_test

@@ -8,6 +8,8 @@
 #include <fstream>
 #include <string>
 
+#include "tests/testing/places.h"
+
 namespace sateen::testing {
 
 // Where the real data sets lie that tests use when present: $SATEEN_DATA or ../shared/data.
@@ -15,7 +17,7 @@ inline std::filesystem::path DataDir() {
   const char* from_environment = std::getenv("SATEEN_DATA");
   return from_environment != nullptr
              ? std::filesystem::path(from_environment)
-             : std::filesystem::path(SATEEN_SOURCE_DIR).parent_path() / "shared" / "data";
+             : std::filesystem::path(testing::SourceDir()).parent_path() / "shared" / "data";
 }
 
 // A folder of its own for one test, removed at the end.

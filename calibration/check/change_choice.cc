@@ -1,0 +1,75 @@
+#include "calibration/check/change_choice.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+namespace sateen {
+namespace {
+
+constexpr double kPerParameter = 15.0;  // of chi2, that an explanation must earn
+constexpr double kAlsoMoved = 0.3;      // of the largest gain
+
+// Frees the lights whose change earns most; false where none earns its parameters.
+bool AddChanges(const CheckSystem& system, const ChangeFit& fit, ChangeMask& mask) {
+  const std::vector<ChangeGain> gains = system.Gains(fit);
+  const auto earned = [&](size_t k) {
+    const double moved = mask.moved[k] ? 0.0 : gains[k].moved - 3.0 * kPerParameter;
+    const double turned = mask.turned[k] ? 0.0 : gains[k].turned - 2.0 * kPerParameter;
+    return std::pair{moved, turned};
+  };
+  double most = 0.0;
+  for (size_t k = 0; k < gains.size(); ++k) {
+    most = std::max({most, earned(k).first, earned(k).second});
+  }
+  if (most <= 0.0) {
+    return false;
+  }
+  for (size_t k = 0; k < gains.size(); ++k) {
+    const auto [moved, turned] = earned(k);
+    if (std::max(moved, turned) > kAlsoMoved * most) {
+      (moved >= turned ? mask.moved : mask.turned)[k] = true;
+    }
+  }
+  return true;
+}
+
+}  // namespace
+
+Result<ChangeChoice> ChooseChange(const CheckSystem& system, size_t lights, size_t sheets,
+                                  const Task& task) {
+  ChangeChoice best;
+  double least = std::numeric_limits<double>::infinity();
+  for (const auto& [camera, lie] :
+       {std::pair{false, false}, {true, false}, {false, true}, {true, true}}) {
+    ChangeMask mask{.moved = std::vector<bool>(lights),
+                    .turned = std::vector<bool>(lights),
+                    .camera = camera,
+                    .sheets = lie};
+    ChangeFit fit = system.Fit(mask, system.Unchanged());
+    while (AddChanges(system, fit, mask)) {
+      fit = system.Fit(mask, fit.change);
+      if (Status status = task.CheckCancelled(); !status) {
+        return tl::unexpected(status.error());
+      }
+    }
+    const double cost = fit.chi2 + kPerParameter * mask.Parameters(sheets);
+    if (cost < least) {
+      least = cost;
+      best = {std::move(mask), std::move(fit)};
+    }
+  }
+  if (Status status = task.CheckCancelled(); !status) {
+    return tl::unexpected(status.error());
+  }
+  if (!std::isfinite(least)) {
+    return Fail(
+        ErrorCode::kDegenerate,
+        "no explanation of the sheets has a finite misfit; need readings with noise, as of a "
+        "camera");
+  }
+  return best;
+}
+
+}  // namespace sateen

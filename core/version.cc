@@ -1,0 +1,7 @@
+#include "core/version.h"
+
+namespace sateen {
+
+std::string Version() { return SATEEN_VERSION; }
+
+}  // namespace sateen

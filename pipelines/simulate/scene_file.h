@@ -1,0 +1,44 @@
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/error.h"
+#include "scanner/sessions/session.h"
+#include "simulation/scene.h"
+#include "simulation/sensor.h"
+
+namespace sateen {
+
+// How the camera was set, for the record; what it does to the picture is sensor.full_scale.
+struct ExposureRecord {
+  double exposure_s = 0.02;
+  double f_number = 8.0;
+  double iso = 100.0;
+  // A chart: exposure times, each as bright as its time says; empty: exposure_s alone.
+  std::vector<double> series_s = {};
+  std::string series_light;  // the light that has the series; empty: all
+  int repeats = 1;           // frames of each kind
+};
+
+struct SceneFile {
+  std::optional<Eigen::Isometry3d> table_from_target;  // of a sheet, and of what is printed
+  Scene scene;
+  std::vector<std::filesystem::path> inputs;  // the scene file and the rig
+  std::string title;
+  ExposureRecord exposure;
+  Sensor sensor;
+  SessionKind kind = SessionKind::kFabric;
+  bool target_is_printed = false;  // so that frames tell its pose, and their record need not
+};
+
+/// Reads a scene file, schema sateen.scene/1 (docs/simulation.md).
+///
+/// Errors   kIo: the file, its rig or its height map is absent or unreadable
+///          kBadData: a key that is missing, unknown or out of range, with the range
+[[nodiscard]] Result<SceneFile> ReadSceneFile(const std::filesystem::path& path);
+
+}  // namespace sateen

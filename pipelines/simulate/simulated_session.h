@@ -1,0 +1,21 @@
+#pragma once
+
+#include "core/error.h"
+#include "core/output_folder.h"
+#include "core/task.h"
+#include "pipelines/simulate/scene_file.h"
+
+namespace sateen {
+
+enum class FrameFormat { kRawDng, kLinearExr };
+
+/// Renders a scene, frame by frame, into a session: frames, rig.json, truth/ (normal, albedo,
+/// height, the share of light per light, the rig) and, last, session.json.
+///
+/// A RAW value is a fraction of full scale. So that value / H is radiance (scanner/sessions/session.h), the
+/// rig of the session has its flux, and truth nothing else, in the units of that camera: the scene's
+/// times 1 / (full_scale H).
+[[nodiscard]] Status StageSimulatedSession(const SceneFile& file, FrameFormat format,
+                                           const Task& task, OutputFolder& folder);
+
+}  // namespace sateen

@@ -1,0 +1,24 @@
+#pragma once
+
+#include <optional>
+
+#include "core/output_folder.h"
+#include "core/task.h"
+#include "imaging/mosaic_stack.h"
+#include "pipelines/solve/maps.h"
+#include "rig/rig.h"
+#include "solver/mosaic/mosaic.h"
+
+namespace sateen {
+
+// A lit frame as balanced radiance, its colours interpolated: for people to look at.
+[[nodiscard]] LightFrame ShowFrame(const MosaicStack& stack, size_t frame);
+
+// Solves a stack band by band into maps, so that memory does not grow with its height.
+[[nodiscard]] Result<SolveSummary> SolveIntoMaps(const MosaicStack& stack, const Rig& rig,
+                                                 const std::optional<Mask>& mask,
+                                                 const MosaicOptions& options,
+                                                 const MapsOptions& maps, const Task& task,
+                                                 OutputFolder& folder);
+
+}  // namespace sateen

@@ -1,0 +1,42 @@
+#pragma once
+
+#include <chrono>
+#include <optional>
+
+#include "core/error.h"
+#include "scanner/checks/frame_check.h"
+#include "scanner/devices/tethered_camera.h"
+#include "scanner/sessions/session.h"
+
+namespace sateen {
+
+// How a session is captured. What decides about its frames is in the journal, and kept on resuming.
+struct CaptureOptions {
+  SessionKind kind = SessionKind::kFabric;
+  // Of every frame, (0, 60] s. Absent: found by test frames (scanner/capture/exposure_search.h).
+  std::optional<double> exposure_s;
+  double f_number = 8.0;
+  double iso = 100.0;
+  // Exposures a light, at most, where they are found: 1 to 3. A sheet always has one.
+  int brackets = 3;
+  // Of each light, (0, 1].
+  double level = 1.0;
+  // From a light's going on to the exposure; 0 to 1.5 s: then the board must hear something.
+  std::chrono::milliseconds settle{30};
+  // How much longer than the exposure a light may stay on: until the camera has delivered. 1 ms to
+  // 60 s; no longer than the board allows a light.
+  std::chrono::milliseconds margin{6000};
+  // Longest wait for a frame beyond its exposure; at least 1 ms.
+  std::chrono::milliseconds deadline{30'000};
+  // How often the board is spoken to while the camera exposes, so that it keeps the light on, in a
+  // thread of its own; less than its 2 s of silence. 0: never, for a board in simulated time.
+  std::chrono::milliseconds keep_alive{400};
+  // How often a frame is taken in all before its failure ends the capture; at least 1.
+  int tries = 3;
+  FrameCheckOptions checks;
+
+  // Names the first field out of range, with its value and its range.
+  [[nodiscard]] Status Validate() const;
+};
+
+}  // namespace sateen

@@ -1,0 +1,36 @@
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <vector>
+
+#include "rig/rig.h"
+#include "scanner/checks/frame_check.h"
+
+// The parts of CheckCapture() that lay frames over each other. `on`: the lights that are on, alone.
+namespace sateen {
+
+// CaptureCheck::shifts. Of a light that is not on, infinitely uncertain.
+[[nodiscard]] std::vector<Shift> ShiftsOf(const Rig& rig, const CaptureLooks& looks,
+                                          const std::vector<bool>& on,
+                                          const FrameCheckOptions& options);
+
+// kMoved, of every frame: which frames have moved, and how far; nothing where none has too far.
+[[nodiscard]] std::optional<CaptureFault> MovedFault(const Rig& rig,
+                                                     const std::vector<Shift>& shifts,
+                                                     const FrameCheckOptions& options);
+
+// The light whose frame alone has moved too far, while those after it have not.
+[[nodiscard]] std::optional<std::size_t> OnlyOneThatMoved(const std::vector<Shift>& shifts,
+                                                          const FrameCheckOptions& options);
+
+// kShaded, of one light each; kOtherLight where they have changed places, or one is lit as another is,
+// which on cloth that does not lie flat only normals show. `signal`: [light][block], dark subtracted.
+// Shadows that take less than `min_light` of all the light of a frame are left aside.
+[[nodiscard]] std::vector<CaptureFault> ShadedFaults(const Rig& rig, const CaptureLooks& looks,
+                                                     const std::vector<std::vector<double>>& signal,
+                                                     const std::vector<bool>& on,
+                                                     const FrameCheckOptions& options,
+                                                     double min_light = 0.0);
+
+}  // namespace sateen

@@ -1,0 +1,45 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/error.h"
+#include "core/task.h"
+#include "imaging/mosaic_stack.h"
+#include "scanner/sessions/read_plan.h"
+#include "scanner/sessions/sensor_noise.h"
+
+namespace sateen {
+
+// Readings of a capture, and what keeps them: memory, or a file without a name that goes when this does.
+struct LoadedMosaics {
+  MosaicStack stack;  // its rows are `readings`
+  std::unique_ptr<MosaicRows> readings;
+  std::map<std::string, std::string> sha256_of_input;
+  std::optional<SensorNoise> noise;  // nothing: not known, or not asked for
+};
+
+// Why the frames of a capture cannot be solved from their mosaics; nothing where they can be.
+[[nodiscard]] std::optional<std::string> WhyNoMosaics(const CapturePlan& plan);
+
+// How much of it lies in memory.
+struct MosaicMemory {
+  std::uintmax_t readings = std::uintmax_t{256} << 20;  // beyond, they go to a file
+  std::uintmax_t decoded = std::uintmax_t{640} << 20;   // at the same time, but one frame at least
+};
+
+/// Decodes the frames of a capture whose WhyNoMosaics() is nothing; `noise` is that of all of them. Where the readings are more than
+/// memory.readings they go to a scratch file in `scratch_dir`, row by row as the decoder has them.
+///
+/// Errors  as LoadFrames(); kIo where the scratch file cannot be written, with the room it needs
+[[nodiscard]] Result<LoadedMosaics> LoadMosaics(const CapturePlan& plan,
+                                                const std::optional<SensorNoise>& noise,
+                                                const std::filesystem::path& scratch_dir,
+                                                const Task& task, const MosaicMemory& memory = {});
+
+}  // namespace sateen

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <filesystem>
+
+#include "core/error.h"
+#include "scanner/sessions/read_plan.h"
+
+namespace sateen {
+
+// Public data layouts of folders. Directions point from the surface to the light: x right, y up in
+// the image, z to the viewer.
+
+// A DiLiGenT folder: light_directions.txt, light_intensities.txt (RGB to divide by), filenames.txt.
+[[nodiscard]] Result<CapturePlan> PlanDiligent(const std::filesystem::path& dir);
+
+// A folder of images in natural order, one for each light of `lights_file` (ReadLightTable).
+[[nodiscard]] Result<CapturePlan> PlanLightsFolder(const std::filesystem::path& dir,
+                                                   const std::filesystem::path& lights_file);
+
+// A folder of photographs in natural order, one for each light, whose lights are told or found
+// elsewhere: until then they are named after the files and shine from straight above. The folder's
+// own mask counts; a reference picture (IsReferenceName) is no frame.
+[[nodiscard]] Result<CapturePlan> PlanPhotographs(const std::filesystem::path& dir);
+
+// Adds to `plan` the mask (unless `find_mask` is false) and the truth that lie in `dir`; else the
+// mask.* one folder up, and the truth in `shared_dir`: data sets of several folders keep one.
+[[nodiscard]] Status FindCompanions(const std::filesystem::path& dir,
+                                    const std::filesystem::path& shared_dir, bool find_mask,
+                                    CapturePlan& plan);
+
+// One folder up: what "dir/.." names, also for "." and "dir/".
+[[nodiscard]] std::filesystem::path ParentOf(const std::filesystem::path& dir);
+
+}  // namespace sateen

@@ -1,0 +1,304 @@
+#include "scanner/sessions/stack_reader.h"
+
+#include <algorithm>
+#include <set>
+#include <utility>
+
+#include "core/sha256.h"
+#include "scanner/sessions/files/folder_listing.h"
+#include "scanner/sessions/frame_loader.h"
+#include "scanner/sessions/lp_layout.h"
+#include "scanner/sessions/public_layouts.h"
+#include "scanner/sessions/read_plan.h"
+#include "scanner/sessions/session_layout.h"
+
+namespace sateen {
+namespace {
+
+namespace fs = std::filesystem;
+
+Status CheckKind(const fs::path& path) {
+  std::error_code error;
+  const fs::file_status status = fs::status(path, error);
+  if (!fs::exists(status)) {
+    return Fail(ErrorCode::kIo, "{}: {}; need a capture: a folder, or an .lp file", path.string(),
+                error.message());
+  }
+  if (!fs::is_directory(status) && LowerCase(path.extension().string()) != ".lp") {
+    return Fail(ErrorCode::kBadData,
+                "{}: is neither a folder nor an .lp file; give the folder of the capture",
+                path.string());
+  }
+  return {};
+}
+
+Result<CapturePlan> PlanByPath(const fs::path& path, const ReadCaptureOptions& options) {
+  if (const Status status = CheckKind(path); !status) {
+    return tl::unexpected(status.error());
+  }
+  const bool find_mask = !options.mask_file.has_value();
+  const auto with_companions = [&](const fs::path& dir, const fs::path& shared_dir) {
+    return [=](CapturePlan plan) -> Result<CapturePlan> {
+      return FindCompanions(dir, shared_dir, find_mask, plan).map([&] { return std::move(plan); });
+    };
+  };
+  if (LowerCase(path.extension().string()) == ".lp" && !fs::is_directory(path)) {
+    const fs::path dir = path.has_parent_path() ? path.parent_path() : fs::path(".");
+    return PlanLp(path).and_then(with_companions(dir, dir));
+  }
+  if (Exists(path / "session.json") || Exists(path / "journal.jsonl")) {
+    return PlanSession(path, options);
+  }
+  if (options.lights_unknown) {
+    return PlanPhotographs(path);
+  }
+  if (Exists(path / "light_directions.txt")) {
+    return PlanDiligent(path).and_then(with_companions(path, path));
+  }
+  for (const fs::path& dir : {path, ParentOf(path)}) {
+    if (Exists(dir / "lights.txt")) {
+      return PlanLightsFolder(path, dir / "lights.txt").and_then(with_companions(path, dir));
+    }
+  }
+  if (options.rig_file) {
+    return PlanPhotographs(path);
+  }
+  return Fail(
+      ErrorCode::kBadData,
+      "{}: found {}, and no session.json, light_directions.txt or lights.txt, nor a "
+      "lights.txt one folder up; need one of them, the path of an .lp file, or --rig with a "
+      "light for each photograph",
+      path.string(), DescribeFolder(path));
+}
+
+// The rig that the caller gives instead of the lights of a public layout.
+Status ReplaceRig(const fs::path& rig_file, CapturePlan& plan) {
+  Result<Rig> rig = ReadRig(rig_file);
+  if (!rig) {
+    return tl::unexpected(rig.error());
+  }
+  const Result<std::string> hash = Sha256OfFile(rig_file);
+  if (!hash) {
+    return tl::unexpected(hash.error());
+  }
+  if (rig->lights.size() != plan.lit.size()) {
+    return Fail(ErrorCode::kBadData,
+                "{}: has {} lights but the capture has {} frames; need as many", rig_file.string(),
+                rig->lights.size(), plan.lit.size());
+  }
+  plan.sha256_of_input[rig_file.string()] = *hash;
+  plan.rig = *std::move(rig);
+  for (LightFiles& files : plan.lit) {
+    for (FrameFile& frame : files) {
+      frame.response = plan.rig.response;
+    }
+  }
+  for (FrameFile& frame : plan.dark) {
+    frame.response = plan.rig.response;
+  }
+  return {};
+}
+
+Result<CapturePlan> Plan(const fs::path& path, const ReadCaptureOptions& options) {
+  Result<CapturePlan> plan = PlanByPath(path, options);
+  if (!plan) {
+    return plan;
+  }
+  if (options.rig_file && !plan->session) {
+    if (const Status status = ReplaceRig(*options.rig_file, *plan); !status) {
+      return tl::unexpected(status.error());
+    }
+  }
+  if (options.mask_file) {
+    plan->mask = options.mask_file;
+  }
+  if (options.truth_dir) {
+    plan->truth = FindSessionTruth(*options.truth_dir);
+    if (!plan->truth) {
+      return Fail(ErrorCode::kIo,
+                  "{}: has no truth/normal.exr; give the folder of a simulated session",
+                  options.truth_dir->string());
+    }
+  }
+  return plan;
+}
+
+// Keeps the lights that are asked for, in the order asked.
+Status SelectLights(const std::vector<int>& wanted, CapturePlan& plan) {
+  if (wanted.empty()) {
+    return {};
+  }
+  const int count = static_cast<int>(plan.lit.size());
+  Lights lights;
+  std::vector<LightFiles> lit;
+  std::set<int> seen;
+  for (const int k : wanted) {
+    if (k < 0 || k >= count) {
+      return Fail(ErrorCode::kInvalidArgument, "light {} does not exist; the capture has 0 to {}",
+                  k, count - 1);
+    }
+    if (!seen.insert(k).second) {
+      return Fail(ErrorCode::kInvalidArgument,
+                  "light {} is asked for twice; name each of 0 to {} once at most", k, count - 1);
+    }
+    lights.push_back(plan.rig.lights[static_cast<size_t>(k)]);
+    lit.push_back(plan.lit[static_cast<size_t>(k)]);
+  }
+  plan.rig.lights = std::move(lights);
+  plan.lit = std::move(lit);
+  return {};
+}
+
+// Every light has a frame, and no file serves two of them.
+Status CheckLitFrames(const fs::path& path, const CapturePlan& plan) {
+  std::set<fs::path> seen;
+  for (size_t k = 0; k < plan.lit.size(); ++k) {
+    if (plan.lit[k].empty()) {
+      return Fail(ErrorCode::kBadData,
+                  "{}: no lit frame of light '{}'; capture it again, or leave this light out with "
+                  "--lights",
+                  path.string(), plan.rig.lights[k].name);
+    }
+    for (const FrameFile& frame : plan.lit[k]) {
+      if (!seen.insert(frame.path.lexically_normal()).second) {
+        return Fail(
+            ErrorCode::kBadData,
+            "{}: is named for two lights or exposures, the second of light '{}'; need a file "
+            "for each",
+            frame.path.string(), plan.rig.lights[k].name);
+      }
+    }
+  }
+  return {};
+}
+
+Status ReadMaskInto(const CapturePlan& plan, Capture& capture) {
+  const std::string name = plan.mask->string();
+  Result<Mask> mask = ReadMask(*plan.mask);
+  if (!mask) {
+    return tl::unexpected(mask.error());
+  }
+  if (Status status = CheckSize(name, mask->Size(), capture.Size()); !status) {
+    if (plan.mask_is_shared) {
+      capture.warnings.push_back("the mask was left out: " + status.error().message);
+      return {};
+    }
+    return status;
+  }
+  if (std::all_of(mask->pixels.begin(), mask->pixels.end(), [](uint8_t m) { return m == 0; })) {
+    return Fail(ErrorCode::kBadData,
+                "{}: the mask is empty; need at least one pixel of half of full scale", name);
+  }
+  const Result<std::string> hash = Sha256OfFile(*plan.mask);
+  if (!hash) {
+    return tl::unexpected(hash.error());
+  }
+  capture.sha256_of_input[name] = *hash;
+  capture.mask = *std::move(mask);
+  return {};
+}
+
+void WarnOfSrgb(int srgb_count, Capture& capture) {
+  if (srgb_count > 0) {
+    capture.warnings.push_back(fmt::format(
+        "{} of {} frames are sRGB files and were linearised: precision of 8 bits, where a camera "
+        "may have changed tone and colour; use RAW or linear files to measure",
+        srgb_count, capture.stack.size()));
+  }
+}
+
+Status CheckCamera(const Capture& capture) {
+  const ImageSize size = capture.Size();
+  if (capture.rig.camera && capture.rig.camera->size_px != size) {
+    const ImageSize camera = capture.rig.camera->size_px;
+    return Fail(ErrorCode::kBadData,
+                "{}: is {} x {} px but the rig's camera has {} x {} px; need the camera's size",
+                capture.FirstName(), size.width, size.height, camera.width, camera.height);
+  }
+  return {};
+}
+
+// Mask and truth, which must fit the frames.
+Status AddCompanions(const CapturePlan& plan, Capture& capture) {
+  if (plan.mask) {
+    if (Status status = ReadMaskInto(plan, capture); !status) {
+      return status;
+    }
+  }
+  if (plan.truth) {
+    Result<Truth> truth = ReadTruth(*plan.truth, capture.Size(), capture.sha256_of_input);
+    if (!truth) {
+      return tl::unexpected(truth.error());
+    }
+    capture.truth = *std::move(truth);
+  }
+  return {};
+}
+
+// As colours or as mosaics.
+Status ReadFrames(const CapturePlan& plan, const ReadCaptureOptions& options, const Task& task,
+                  Capture& capture) {
+  const std::optional<std::string> why_not = WhyNoMosaics(plan);
+  if (options.domain != Domain::kRgb && !why_not) {
+    Result<std::optional<SensorNoise>> noise;
+    if (options.by_noise) {
+      noise = FindSensorNoise(plan, task);
+    }
+    if (!noise) {
+      // No frame that is solved depends on it.
+      capture.warnings.push_back("the noise is not measured on the repeat: " +
+                                 noise.error().message);
+      noise = std::nullopt;
+    }
+    return LoadMosaics(plan, *noise, options.scratch_dir, task).map([&](LoadedMosaics mosaics) {
+      capture.sha256_of_input = mosaics.sha256_of_input;
+      capture.mosaics = std::move(mosaics);
+    });
+  }
+  if (options.domain == Domain::kRaw) {
+    return Fail(ErrorCode::kBadData, "{}: cannot be solved from the mosaics: {}",
+                plan.lit[0][0].path.string(), *why_not);
+  }
+  if (options.domain == Domain::kAuto) {
+    capture.why_no_mosaics = *why_not;
+  }
+  return LoadFrames(plan.lit, plan.dark, options.encoding, task).map([&](LoadedFrames frames) {
+    capture.stack = std::move(frames.stack);
+    capture.sha256_of_input = std::move(frames.sha256_of_input);
+    WarnOfSrgb(frames.srgb_count, capture);
+  });
+}
+
+}  // namespace
+
+Result<Capture> ReadCapture(const fs::path& path, const ReadCaptureOptions& options,
+                            const Task& task) {
+  Result<CapturePlan> plan = Plan(path, options);
+  if (!plan) {
+    return tl::unexpected(plan.error());
+  }
+  if (const Status status = SelectLights(options.lights, *plan); !status) {
+    return tl::unexpected(status.error());
+  }
+  if (const Status status = CheckLitFrames(path, *plan); !status) {
+    return tl::unexpected(status.error());
+  }
+  Capture capture;
+  if (const Status status = ReadFrames(*plan, options, task, capture); !status) {
+    return tl::unexpected(status.error());
+  }
+  capture.layout = plan->layout;
+  capture.rig = std::move(plan->rig);
+  capture.session = std::move(plan->session);
+  capture.warnings.insert(capture.warnings.begin(), plan->warnings.begin(), plan->warnings.end());
+  capture.sha256_of_input.merge(plan->sha256_of_input);
+  if (const Status status = CheckCamera(capture); !status) {
+    return tl::unexpected(status.error());
+  }
+  if (const Status status = AddCompanions(*plan, capture); !status) {
+    return tl::unexpected(status.error());
+  }
+  return capture;
+}
+
+}  // namespace sateen

@@ -1,0 +1,110 @@
+#include "solver/least_squares/reference_backends.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "core/check.h"
+#include "solver/least_squares/pixel_system.h"
+
+namespace sateen {
+namespace {
+
+// N_r, N_g, N_b, N of equation (3) as columns, and the condition number of the l_k.
+struct Solution {
+  Eigen::Matrix<double, 3, 4> n;
+  double condition = std::numeric_limits<double>::infinity();
+};
+
+// As the source and textbooks have it: dynamic size, double, decomposed anew for each pixel.
+struct JacobiSvd {
+  static Solution Solve(const PixelSystem& system) {
+    const Eigen::JacobiSVD<Eigen::MatrixXd> svd(system.L(),
+                                                Eigen::ComputeThinU | Eigen::ComputeThinV);
+    const Eigen::VectorXd& sigma = svd.singularValues();
+    return {svd.solve(system.Rhs()), sigma[0] / sigma[2]};
+  }
+};
+
+// The condition number from the eigenvalues of L^T L, exact enough below 1e7.
+double ConditionOf(const Eigen::Matrix3d& normal_matrix) {
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(normal_matrix, Eigen::EigenvaluesOnly);
+  const Eigen::Vector3d& lambda = eigen.eigenvalues();
+  return lambda[0] > 0.0 ? std::sqrt(lambda[2] / lambda[0])
+                         : std::numeric_limits<double>::infinity();
+}
+
+struct Qr {
+  static Solution Solve(const PixelSystem& system) {
+    const Eigen::Matrix<double, Eigen::Dynamic, 3> l = system.L();
+    return {l.colPivHouseholderQr().solve(system.Rhs()), ConditionOf(l.transpose() * l)};
+  }
+};
+
+struct Ldlt {
+  static Solution Solve(const PixelSystem& system) {
+    const Eigen::Matrix3d normal_matrix = system.L().transpose() * system.L();
+    return {normal_matrix.ldlt().solve(system.L().transpose() * system.Rhs()),
+            ConditionOf(normal_matrix)};
+  }
+};
+
+void Store(const PixelSystem& system, const Solution& solution, size_t pixel, NormalField& field) {
+  const Eigen::Vector3d b = solution.n.col(3);
+  const Eigen::Vector3d n = b.stableNormalized();  // (4)
+  for (size_t c = 0; c < 3; ++c) {
+    const auto column = static_cast<Eigen::Index>(c);
+    field.normal[c].pixels[pixel] = static_cast<float>(n[column]);
+    field.albedo[c].pixels[pixel] = static_cast<float>(solution.n.col(column).stableNorm());
+  }
+  const double sum = (system.Rhs().col(3) - system.L() * b).stableNorm();
+  field.residual.pixels[pixel] = static_cast<float>(sum / std::sqrt(system.Count()));
+}
+
+template <typename Method>
+void SolveRows(const LightStack& stack, const Rig& rig, const LambertianOptions& options,
+               Reason which, int row_begin, int row_end, NormalField& field) {
+  PixelSystem system(stack, rig, options);
+  for (int row = row_begin; row < row_end; ++row) {
+    for (int column = 0; column < field.reason.width; ++column) {
+      const size_t pixel = field.reason.Index(column, row);
+      if (field.reason.pixels[pixel] != static_cast<uint8_t>(which)) {
+        continue;
+      }
+      system.Gather(column, row);
+      Reason reason = system.SampleReason();
+      if (reason == Reason::kSolved) {
+        const Solution solution = Method::Solve(system);
+        if (solution.condition <= options.max_condition && solution.n.allFinite()) {
+          Store(system, solution, pixel, field);
+        } else {
+          reason = Reason::kIllConditioned;
+        }
+      }
+      field.samples.pixels[pixel] = static_cast<uint8_t>(std::min(system.Count(), 255));
+      field.reason.pixels[pixel] = static_cast<uint8_t>(reason);
+    }
+  }
+}
+
+}  // namespace
+
+void SolveRowsInDouble(const LightStack& stack, const Rig& rig, const LambertianOptions& options,
+                       Backend backend, Reason which, int row_begin, int row_end,
+                       NormalField& field) {
+  switch (backend) {
+    case Backend::kJacobiSvd:
+      return SolveRows<JacobiSvd>(stack, rig, options, which, row_begin, row_end, field);
+    case Backend::kQr:
+      return SolveRows<Qr>(stack, rig, options, which, row_begin, row_end, field);
+    case Backend::kLdlt:
+      return SolveRows<Ldlt>(stack, rig, options, which, row_begin, row_end, field);
+    case Backend::kFast:
+    case Backend::kAuto:
+      break;
+  }
+  SATEEN_CHECK(false);
+}
+
+}  // namespace sateen

@@ -1,0 +1,173 @@
+#include "scanner/daemon/rig_service.h"
+
+#include <gmock/gmock.h>
+
+#include <stdexcept>
+
+#include "tests/scanner/daemon/daemon_fakes.h"
+
+namespace sateen::rig_service_test {
+namespace {
+
+using testing::AllEvents;
+using testing::FakeDaemon;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using testing::kLong;
+using ::testing::SizeIs;
+using testing::WorkJob;
+
+TEST(RigService, ASecondAskerIsToldWhoHasTheRigAndSinceWhen) {
+  FakeDaemon daemon;
+  const std::uint64_t id = daemon.TurnOn(3, "alice at the desk");
+
+  const auto refused = daemon.service.Begin(LightJob({.channel = 4}, "bob"));
+
+  ASSERT_FALSE(refused.has_value());
+  EXPECT_EQ(refused.error().error.code, ErrorCode::kDevice);
+  EXPECT_THAT(refused.error().error.message, HasSubstr("light of 3 by alice at the desk since 20"));
+  ASSERT_TRUE(refused.error().holder.has_value());
+  EXPECT_EQ(refused.error().holder->id, id);
+  daemon.service.Cancel(id, "bob");
+  ASSERT_TRUE(daemon.service.WaitIdle(kLong));
+  EXPECT_THAT(daemon.rig.board.lights_set, SizeIs(1));
+}
+
+TEST(RigService, CancellingTurnsTheLightOffAndNamesWho) {
+  FakeDaemon daemon;
+  const std::uint64_t id = daemon.TurnOn(3);
+  EXPECT_THAT(daemon.service.State().lit, ::testing::ElementsAre(3));
+
+  EXPECT_TRUE(daemon.service.Cancel(id, "bob"));
+
+  const std::vector<JobEvent> events = AllEvents(daemon.service, id);
+  ASSERT_TRUE(daemon.service.WaitIdle(kLong));
+  EXPECT_THAT(daemon.rig.board.lit, IsEmpty());
+  EXPECT_EQ(events.back().type, "failed");
+  EXPECT_THAT(events.back().data, HasSubstr("cancelled by bob"));
+  EXPECT_EQ(ErrorFromJson(events.back().data).code, ErrorCode::kCancelled);
+  EXPECT_THAT(daemon.service.State().lit, IsEmpty());
+}
+
+// However a job ends, and whatever it leaves behind.
+TEST(RigService, NoLightIsOnAfterAnyEndOfAJob) {
+  FakeDaemon daemon;
+  const auto leave_on = [](JobContext& job) {
+    EXPECT_TRUE((*job.Devices().Board())->SetLight(5, 0.5, std::chrono::seconds(10)));
+  };
+  const std::vector<JobWork> ends = {[&](JobContext& job) -> Result<std::string> {
+                                       leave_on(job);
+                                       return "{}";
+                                     },
+                                     [&](JobContext& job) -> Result<std::string> {
+                                       leave_on(job);
+                                       return Fail(ErrorCode::kIo, "disk full");
+                                     },
+                                     [&](JobContext& job) -> Result<std::string> {
+                                       leave_on(job);
+                                       throw std::runtime_error("out of memory");
+                                     }};
+  for (const JobWork& work : ends) {
+    const auto ended = daemon.service.RunToEnd(WorkJob(work));
+    ASSERT_TRUE(ended.has_value());
+    EXPECT_THAT(daemon.rig.board.lit, IsEmpty());
+    EXPECT_EQ(daemon.service.State().lights_fault, "");
+  }
+  EXPECT_THAT(daemon.rig.board.lights_set, SizeIs(3));
+  EXPECT_THAT(daemon.service.State().last_job->error->message, HasSubstr("out of memory"));
+}
+
+TEST(RigService, AJobThatLosesTheBoardIsReportedUntilTheBoardHasConfirmed) {
+  FakeDaemon daemon;
+  daemon.rig.held = false;  // the link waits for a lost board
+  const auto ended = daemon.service.RunToEnd(WorkJob([&](JobContext& job) -> Result<std::string> {
+    job.Lit({2});
+    EXPECT_TRUE((*job.Devices().Board())->SetLight(2, 0.5, std::chrono::seconds(10)));
+    daemon.rig.board.Unplug();
+    return Fail(ErrorCode::kDevice, "the port is gone");
+  }));
+  ASSERT_TRUE(ended.has_value());
+  EXPECT_THAT(daemon.service.State().lights_fault, HasSubstr("did not confirm"));
+  EXPECT_FALSE(daemon.service.State().board.has_value());
+
+  daemon.rig.board.Replug();
+  daemon.rig.board.plugged = true;  // Replug() clears only what was under way
+  ASSERT_TRUE(daemon.service.RunToEnd(LightsOffJob("alice")).has_value());
+  EXPECT_EQ(daemon.service.State().lights_fault, "");
+  EXPECT_EQ(daemon.service.State().board->firmware, "fakefake");
+}
+
+// A preview tells of nothing before it ends, and yet has lit a light.
+TEST(RigService, AFirstJobThatReportsNothingAndLosesTheBoardIsAFault) {
+  FakeDaemon daemon;
+  daemon.rig.held = false;  // the link waits for a lost board
+  ASSERT_TRUE(daemon.service.RunToEnd(WorkJob([&](JobContext& job) -> Result<std::string> {
+    EXPECT_TRUE((*job.Devices().Board())->SetLight(2, 0.5, std::chrono::seconds(10)));
+    daemon.rig.board.Unplug();
+    return Fail(ErrorCode::kDevice, "lost");
+  })));
+  EXPECT_THAT(daemon.service.State().lights_fault, HasSubstr("did not confirm"));
+}
+
+TEST(RigService, WithoutABoardNothingIsWrongWithTheLights) {
+  FakeDaemon daemon;
+  daemon.rig.board.plugged = false;
+  const auto ended = daemon.service.RunToEnd(
+      WorkJob([](JobContext& /*job*/) -> Result<std::string> { return "{}"; }));
+  ASSERT_TRUE(ended.has_value());
+  EXPECT_EQ(daemon.service.State().lights_fault, "");
+}
+
+TEST(RigService, EventsAreFollowedFromAnyPlace) {
+  FakeDaemon daemon;
+  const auto id = daemon.service.Begin(WorkJob([](JobContext& job) -> Result<std::string> {
+    job.Report("1");
+    job.Report("2");
+    return "3";
+  }));
+  const std::vector<JobEvent> all = AllEvents(daemon.service, *id);
+  ASSERT_THAT(all, SizeIs(3));
+  EXPECT_EQ(all[2].type, "done");
+  const auto rest = daemon.service.Follow(*id, 2, kLong);
+  ASSERT_THAT(rest->events, SizeIs(1));
+  EXPECT_EQ(rest->events[0].sequence, 3U);
+  EXPECT_EQ(rest->events[0].data, "3");
+  EXPECT_TRUE(rest->ended);
+  EXPECT_TRUE(daemon.service.Follow(*id, 3, kLong)->ended);  // does not wait for more
+  EXPECT_FALSE(daemon.service.Follow(99, 0, kLong).has_value());
+}
+
+TEST(RigService, KeepsNoMoreThanItSays) {
+  FakeDaemon daemon;
+  const auto talk = [](JobContext& job) -> Result<std::string> {
+    for (int i = 0; i < 1500; ++i) {
+      job.Report("{}");
+    }
+    return "{}";
+  };
+  const auto first = daemon.service.RunToEnd(WorkJob(talk));
+  EXPECT_EQ(first->last_event, 1501U);
+  const std::vector<JobEvent> kept = AllEvents(daemon.service, first->id);
+  EXPECT_THAT(kept, SizeIs(1000));
+  EXPECT_EQ(kept.front().sequence, 502U);
+  for (int i = 0; i < 30; ++i) {
+    ASSERT_TRUE(daemon.service.RunToEnd(LightsOffJob("alice")).has_value());
+  }
+  EXPECT_FALSE(daemon.service.Find(first->id).has_value());
+  EXPECT_THAT(daemon.service.Jobs(), SizeIs(21));
+  EXPECT_EQ(daemon.service.Jobs().back().id, 31U);
+}
+
+TEST(RigService, StopCancelsTurnsOffAndRefuses) {
+  FakeDaemon daemon;
+  const std::uint64_t id = daemon.TurnOn(3);
+  daemon.service.Stop();
+  EXPECT_THAT(daemon.rig.board.lit, IsEmpty());
+  EXPECT_EQ(daemon.service.Find(id)->error->code, ErrorCode::kCancelled);
+  const auto refused = daemon.service.Begin(LightsOffJob("bob"));
+  ASSERT_FALSE(refused.has_value());
+  EXPECT_FALSE(refused.error().holder.has_value());
+}
+
+}  // namespace
+}  // namespace sateen::rig_service_test
