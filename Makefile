@@ -21,7 +21,7 @@ CTEST = ctest --output-on-failure --no-tests=error -j$(JOBS)
 OUR_SOURCES = git ls-files -z --cached --others --exclude-standard '*.h' '*.cc' '*.c'
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo programs build test bench accuracy firmware flash fuzz format format-check tidy asan tsan clean
+.PHONY: help setup demo programs build test bench accuracy firmware flash fuzz mutants format format-check tidy asan tsan clean
 
 help:  ## This list
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 16
@@ -68,6 +68,9 @@ fuzz: setup  ## libFuzzer with the address sanitizer over each target of fuzz/
 	    mkdir -p build/fuzz/found/$$name; echo "== $$name"; \
 	    $$target -max_total_time=$(SECONDS) -max_len=400 -print_final_stats=1 \
 	        build/fuzz/found/$$name fuzz/corpus/$$name || exit 1; done
+
+mutants: setup  ## Break the code in each way of tests/mutants; see a test fail. WORD=..., part of a name
+	@tools/mutants -j$(JOBS) $(WORD)
 
 format: setup  ## Format all sources in place
 	@$(OUR_SOURCES) | xargs -0r clang-format -i
