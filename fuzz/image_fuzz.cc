@@ -1,0 +1,27 @@
+// Any bytes go for a picture and for a camera RAW file. What is read has the pixels that it says.
+#include "fuzz/target.h"
+#include "imaging/file_check.h"
+#include "imaging/image_io.h"
+#include "imaging/raw.h"
+
+namespace sateen::fuzz {
+
+void Try(std::string_view bytes) {
+  // The name of the one kind that is not known by its content.
+  const std::filesystem::path path = FileOf("picture.tga", bytes);
+  static_cast<void>(CheckTiffIsWhole(path));
+  if (const auto photo = ReadPhoto(path)) {
+    const ImageSize read = photo->rgb.Size();
+    Need(read.width > 0 && read.height > 0);
+    for (const Image<float>& plane : photo->rgb.planes) {
+      Need(plane.Size() == read && plane.pixels.size() == read.PixelCount());
+    }
+  }
+  if (const auto mosaic = ReadRawMosaic(path)) {
+    Need(mosaic->samples.width >= 2 && mosaic->samples.height >= 2 &&
+         mosaic->black < mosaic->white);
+    Need(Demosaic(*mosaic).Size() == mosaic->samples.Size());
+  }
+}
+
+}  // namespace sateen::fuzz
