@@ -44,8 +44,8 @@ Domain DomainNamed(const SolveArgs& args) {
   return args.domain == "rgb" || !HasMosaics(args) ? Domain::kRgb : Domain::kAuto;
 }
 
-ReadCaptureOptions ReadOptionsOf(const SolveArgs& args) {
-  ReadCaptureOptions options = args.read;
+ReadDatasetOptions ReadOptionsOf(const SolveArgs& args) {
+  ReadDatasetOptions options = args.read;
   options.domain = DomainNamed(args);
   options.by_noise = LadderModeNamed(args.robust).has_value();
   options.scratch_dir = args.output;
@@ -143,7 +143,7 @@ double LowestLightMm(const Rig& rig) {
   return lowest_mm;
 }
 
-Status CheckSupported(const SolveArgs& args, Capture& capture) {
+Status CheckSupported(const SolveArgs& args, Dataset& capture) {
   if (capture.session && capture.session->table_from_sheet) {
     return Fail(ErrorCode::kBadData,
                 "{}: the session has table_from_sheet, but solving a tilted sheet is not supported "
@@ -254,7 +254,7 @@ Status StageHeight(const SolveArgs& args, const SolveOutcome& outcome, const Tas
 }
 
 Result<NormalField> SolveStack(const SolveArgs& args, const LambertianOptions& least_squares,
-                               const Capture& capture, const Task& task) {
+                               const Dataset& capture, const Task& task) {
   const std::optional<LadderMode> mode = LadderModeNamed(args.robust);
   if (capture.mosaics) {
     return SolveMosaic(capture.mosaics->stack, capture.rig, capture.mask,
@@ -270,13 +270,13 @@ Result<NormalField> SolveStack(const SolveArgs& args, const LambertianOptions& l
 }
 
 // Maps that need no other row of themselves than the one that is written.
-bool CanStream(const SolveArgs& args, const Capture& capture) {
+bool CanStream(const SolveArgs& args, const Dataset& capture) {
   return capture.mosaics && !capture.truth && !args.undistort && !args.relief;
 }
 
 Status SolveByBands(const SolveArgs& args, const LambertianOptions& least_squares, const Task& task,
                     OutputFolder& folder, SolveOutcome& outcome) {
-  const Capture& capture = outcome.capture;
+  const Dataset& capture = outcome.capture;
   return SolveIntoMaps(capture.mosaics->stack, capture.rig, capture.mask,
                        {.mode = LadderModeNamed(args.robust), .least_squares = least_squares},
                        {.normal_y_down = args.normal_y == "down"}, task, folder)
@@ -346,7 +346,7 @@ Result<SolveOutcome> SolveCapture(const SolveArgs& args, const Task& task, std::
   if (!folder) {
     return tl::unexpected(folder.error());
   }
-  Result<Capture> capture = ReadCapture(args.capture, ReadOptionsOf(args), task);
+  Result<Dataset> capture = ReadDataset(args.capture, ReadOptionsOf(args), task);
   if (!capture) {
     return tl::unexpected(capture.error());
   }

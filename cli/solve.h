@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "core/task.h"
-#include "scanner/sessions/stack_reader.h"
+#include "scanner/sessions/dataset.h"
 #include "solver/evaluate.h"
 #include "solver/lambertian.h"
 
@@ -17,7 +17,7 @@ namespace sateen::cli {
 struct SolveArgs {
   std::filesystem::path capture;
   std::filesystem::path output;
-  ReadCaptureOptions read;
+  ReadDatasetOptions read;
   std::string rig_file;   // empty: the capture's own
   std::string mask_file;  // empty: the capture's own
   std::string truth_dir;  // empty: what lies beside the capture
@@ -47,7 +47,7 @@ struct ReliefOutcome {
 
 // Everything that a report speaks of.
 struct SolveOutcome {
-  Capture capture;
+  Dataset capture;
   // Of captures that are solved band by band straight into maps the summary alone.
   NormalField field;
   std::optional<ReliefOutcome> relief;

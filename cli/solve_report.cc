@@ -143,7 +143,7 @@ std::string BackendWords(const SolveSummary& summary) {
 }
 
 // By which mosaics were weighted; null: nothing was.
-const SensorNoise* NoiseOfMosaics(const Capture& capture) {
+const SensorNoise* NoiseOfMosaics(const Dataset& capture) {
   return capture.mosaics && capture.mosaics->noise ? &*capture.mosaics->noise : nullptr;
 }
 

@@ -14,7 +14,7 @@
 #include "core/scratch_folder.h"
 #include "pipelines/simulate/scene_file.h"
 #include "pipelines/simulate/simulated_session.h"
-#include "scanner/sessions/stack_reader.h"
+#include "scanner/sessions/dataset.h"
 #include "simulation/relief.h"
 #include "simulation/rigs.h"
 #include "solver/kernels/fast_kernel.h"
@@ -54,7 +54,7 @@ bool IsInside(const std::optional<Mask>& mask, size_t pixel) {
   return !mask || mask->pixels[pixel] != 0;
 }
 
-void Expose(Capture& capture) {
+void Expose(Dataset& capture) {
   std::vector<float> samples;
   for (const LightFrame& frame : capture.stack) {
     for (size_t p = 0; p < frame.rgb[1].pixels.size(); ++p) {
@@ -103,7 +103,7 @@ class AccuracyBench {
 
   // A Lambertian surface under near lights: what the ladder may cost where it is not needed.
   Status MeasureRelief() {
-    Capture capture{.rig = RingRig(kReliefPx)};
+    Dataset capture{.rig = RingRig(kReliefPx)};
     Result<RenderedRelief> rendered = RenderRelief({.shape = ReliefShape::kRipple,
                                                     .max_slope_rad = 30.0 * kRadPerDeg,
                                                     .sensor = SensorModel{}},
@@ -118,9 +118,9 @@ class AccuracyBench {
   }
 
   Status MeasurePublic(const DataSet& set) {
-    Result<Capture> capture =
+    Result<Dataset> capture =
         args_.data.empty() ? Fail(ErrorCode::kIo, "no --data and no SATEEN_DATA")
-                           : ReadCapture(args_.data / set.folder, {.lights = set.lights}, Quiet(0));
+                           : ReadDataset(args_.data / set.folder, {.lights = set.lights}, Quiet(0));
     if (!capture || !capture->truth) {
       report_.skipped.push_back(
           fmt::format("{}: {}", set.name, capture ? "it has no truth" : capture.error().message));
@@ -151,22 +151,22 @@ class AccuracyBench {
     }
     const std::string name = file.stem().string();
     const auto read = [&](Domain domain) {
-      return ReadCapture(scratch.Path(), {.domain = domain, .scratch_dir = scratch.Path()},
+      return ReadDataset(scratch.Path(), {.domain = domain, .scratch_dir = scratch.Path()},
                          Quiet(0));
     };
-    const Result<Capture> colours = read(Domain::kRgb);
+    const Result<Dataset> colours = read(Domain::kRgb);
     if (!colours) {
       return tl::unexpected(colours.error());
     }
     status = MeasureColours(name, *colours);
-    const Result<Capture> mosaics = status ? read(Domain::kAuto) : tl::unexpected(status.error());
+    const Result<Dataset> mosaics = status ? read(Domain::kAuto) : tl::unexpected(status.error());
     if (!mosaics) {
       return tl::unexpected(mosaics.error());
     }
     return mosaics->mosaics ? MeasureMosaics(name, *mosaics) : Status();
   }
 
-  Status MeasureColours(const std::string& name, const Capture& capture) {
+  Status MeasureColours(const std::string& name, const Dataset& capture) {
     Status status;
     if (PixelsOf(capture) <= kMostPixelsForComparators) {
       for (const Comparator comparator : ComparatorsFor(capture.rig)) {
@@ -193,7 +193,7 @@ class AccuracyBench {
     return status.and_then([&] { return task_.CheckCancelled(); });
   }
 
-  Status MeasureMosaics(const std::string& name, const Capture& capture) {
+  Status MeasureMosaics(const std::string& name, const Dataset& capture) {
     const auto measure = [&](const char* method, const MosaicOptions& options) {
       return Measure(name, method, capture, true, [&](const Task& task) {
         return SolveMosaicInto(capture.mosaics->stack, capture.rig, capture.mask, options, task,
@@ -205,13 +205,13 @@ class AccuracyBench {
     });
   }
 
-  static int64_t PixelsOf(const Capture& capture) {
+  static int64_t PixelsOf(const Dataset& capture) {
     const auto all = static_cast<int64_t>(capture.Size().PixelCount());
     return capture.mask ? all - std::ranges::count(capture.mask->pixels, uint8_t{0}) : all;
   }
 
   // Slow methods run once, ours as often as asked, on one thread and on all.
-  Status Measure(const std::string& data, std::string method, const Capture& capture, bool is_ours,
+  Status Measure(const std::string& data, std::string method, const Dataset& capture, bool is_ours,
                  const std::function<Status(const Task&)>& solve) {
     const auto pixels = static_cast<double>(PixelsOf(capture));
     const Result<double> one =
@@ -244,7 +244,7 @@ class AccuracyBench {
     return task_.CheckCancelled();
   }
 
-  Status MeasureAlbedo(const Capture& capture, AccuracyRow& row) const {
+  Status MeasureAlbedo(const Dataset& capture, AccuracyRow& row) const {
     if (!capture.truth->albedo) {
       return {};
     }
@@ -264,7 +264,7 @@ class AccuracyBench {
 
   // Root mean square of error over uncertainty, and the share of errors inside the interval.
   void Compare(const Image<float>& errors, const Image<float>& uncertainties,
-               const Capture& capture, double& standardised, double& coverage) const {
+               const Dataset& capture, double& standardised, double& coverage) const {
     double squares = 0.0;
     int64_t inside = 0;
     int64_t count = 0;

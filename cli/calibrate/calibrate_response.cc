@@ -74,7 +74,7 @@ Result<ResponseCalibration> Calibrate(const CalibrateResponseArgs& args, const T
   }
   ReadChartOptions options{.find = args.find};
   options.rig_file = RigFileToBeginWith(args.rig, args.output);
-  Result<ChartCapture> capture = ReadChart(args.chart, *chart, options, task);
+  Result<ChartSession> capture = ReadChart(args.chart, *chart, options, task);
   if (!capture) {
     return tl::unexpected(capture.error());
   }

@@ -35,7 +35,7 @@ struct ResponseErrors {
 };
 
 struct ResponseCalibration : RigCalibration {
-  ChartCapture capture;
+  ChartSession capture;
   ResponseFit fit;
   double tolerance = 0.01;  // of linearity
   std::optional<ResponseErrors> errors;

@@ -15,9 +15,9 @@
 #include "core/sha256.h"
 #include "imaging/image_io.h"
 #include "pipelines/calibrate/rig_record.h"
+#include "scanner/sessions/dataset.h"
 #include "scanner/sessions/files/circle_file.h"
 #include "scanner/sessions/files/folder_listing.h"
-#include "scanner/sessions/stack_reader.h"
 
 namespace sateen::cli {
 namespace {
@@ -57,11 +57,11 @@ class SpheresCalibrator {
 
  private:
   Status ReadPhotographs() {
-    ReadCaptureOptions options{.lights_unknown = true, .encoding = EncodingNamed(args_.encoding)};
+    ReadDatasetOptions options{.lights_unknown = true, .encoding = EncodingNamed(args_.encoding)};
     if (!args_.mask.empty()) {
       options.mask_file = args_.mask;
     }
-    Result<Capture> capture = ReadCapture(args_.photos, options, task_);
+    Result<Dataset> capture = ReadDataset(args_.photos, options, task_);
     if (!capture) {
       return tl::unexpected(capture.error());
     }
@@ -324,7 +324,7 @@ class SpheresCalibrator {
 
   const CalibrateSpheresArgs& args_;
   const Task task_;
-  Capture capture_;
+  Dataset capture_;
   std::vector<Image<float>> grays_;  // [frame]
   Image<float> gray_;                // where outlines are looked for
   SpheresCalibration result_;

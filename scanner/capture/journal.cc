@@ -46,7 +46,7 @@ Result<JournalBegun> ReadBegun(JsonReader& json) {
   return begun;
 }
 
-Result<FramePlan> ReadPlan(JsonReader& json) {
+Result<FramePlan> ReadFramePlan(JsonReader& json) {
   json.Require(!json.String("reason").empty(), "reason", "is empty; need the reason");
   std::vector<JsonReader> frames = json.Objects("plan");
   json.Require(!frames.empty(), "plan", "is empty; need at least one frame");
@@ -126,7 +126,7 @@ class JournalReader {
   Status TakePlanned(JsonReader& json) {
     const std::optional<double> exposure_s = json.OptionalNumber("exposure_s");
     json.Require(exposure_s.value_or(0.0) >= 0.0, "exposure_s", "is below 0");
-    Result<FramePlan> plan = ReadPlan(json);
+    Result<FramePlan> plan = ReadFramePlan(json);
     if (!plan) {
       return tl::unexpected(plan.error());
     }

@@ -6,10 +6,10 @@
 
 #include "core/parallel.h"
 #include "imaging/raw.h"
+#include "scanner/sessions/dataset.h"
 #include "scanner/sessions/files/patch_places.h"
 #include "scanner/sessions/frame_loader.h"
 #include "scanner/sessions/session_layout.h"
-#include "scanner/sessions/stack_reader.h"
 
 namespace sateen {
 namespace {
@@ -27,7 +27,7 @@ struct ChartFile {
   double exposure_s = 0.0;
 };
 
-Result<std::vector<ChartFile>> FilesOf(const fs::path& dir, const CapturePlan& plan) {
+Result<std::vector<ChartFile>> FilesOf(const fs::path& dir, const ReadPlan& plan) {
   std::vector<ChartFile> files;
   const std::vector<SessionFrame>& frames = plan.session->frames;
   for (const SessionFrame& frame : frames) {
@@ -97,8 +97,8 @@ class ChartReader {
               const Task& task)
       : dir_(dir), chart_(chart), options_(options), task_(task) {}
 
-  Result<ChartCapture> Run() {
-    Result<CapturePlan> plan = PlanSessionRig(dir_, {.rig_file = options_.rig_file});
+  Result<ChartSession> Run() {
+    Result<ReadPlan> plan = PlanSessionRig(dir_, {.rig_file = options_.rig_file});
     if (!plan) {
       return tl::unexpected(plan.error());
     }
@@ -266,12 +266,12 @@ class ChartReader {
   std::vector<ChartFile> files_;
   RawMosaic first_;  // the frame in which the chart was found
   std::vector<PatchPlaces> places_;
-  ChartCapture capture_;
+  ChartSession capture_;
 };
 
 }  // namespace
 
-Result<ChartCapture> ReadChart(const fs::path& dir, const Chart& chart,
+Result<ChartSession> ReadChart(const fs::path& dir, const Chart& chart,
                                const ReadChartOptions& options, const Task& task) {
   return ChartReader(dir, chart, options, task).Run();
 }

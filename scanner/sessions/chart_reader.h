@@ -24,7 +24,7 @@ struct ReadChartOptions {
 };
 
 // A session of a neutral chart: where its patches are, and what every frame reads there.
-struct ChartCapture {
+struct ChartSession {
   Rig rig;
   ChartPose pose;
   ChartReadings readings;
@@ -40,11 +40,11 @@ struct ChartCapture {
 /// The chart is looked for in the brightest frame whose brightest parts are not saturated; the middle
 /// 60 % of each patch, along each side, are read. Memory: two bytes a site that is read.
 ///
-/// Errors   kIo, kBadData: as ReadCapture(); the session is of another kind; the rig has no camera; a
+/// Errors   kIo, kBadData: as ReadDataset(); the session is of another kind; the rig has no camera; a
 ///          frame is no camera RAW file, has no exposure_s, or another aperture, ISO, size, pattern or
 ///          levels than the first; the chart is not found, or a patch is too small to be read
 ///          kCancelled
-[[nodiscard]] Result<ChartCapture> ReadChart(const std::filesystem::path& dir, const Chart& chart,
+[[nodiscard]] Result<ChartSession> ReadChart(const std::filesystem::path& dir, const Chart& chart,
                                              const ReadChartOptions& options,
                                              const Task& task = {});
 

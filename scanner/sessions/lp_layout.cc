@@ -28,7 +28,7 @@ Result<fs::path> FindImage(const std::string& name, const fs::path& dir, std::st
 }
 
 // Adds the image to the plan and gives its direction back.
-Result<NumberRow> ReadLine(const TextLine& line, const fs::path& lp_file, CapturePlan& plan) {
+Result<NumberRow> ReadLine(const TextLine& line, const fs::path& lp_file, ReadPlan& plan) {
   const std::string place = PlaceOf(lp_file, line.number);
   const std::vector<std::string_view> words = SplitWords(line.text);
   if (words.size() < 4) {
@@ -73,7 +73,7 @@ Status CheckCount(const std::vector<TextLine>& lines, const fs::path& lp_file) {
 }
 
 // Lamps at a finite distance are read as if they were far away: the unit is not in the file.
-void WarnOfPositions(const std::vector<NumberRow>& rows, CapturePlan& plan) {
+void WarnOfPositions(const std::vector<NumberRow>& rows, ReadPlan& plan) {
   const auto is_position = [](const NumberRow& row) {
     const double length = Eigen::Vector3d(row.values[0], row.values[1], row.values[2]).norm();
     return length < kUnitLengths.least || length > kUnitLengths.most;
@@ -89,8 +89,8 @@ void WarnOfPositions(const std::vector<NumberRow>& rows, CapturePlan& plan) {
 
 }  // namespace
 
-Result<CapturePlan> PlanLp(const fs::path& lp_file) {
-  CapturePlan plan;
+Result<ReadPlan> PlanLp(const fs::path& lp_file) {
+  ReadPlan plan;
   plan.layout = "lp";
   const Result<std::vector<TextLine>> lines = ReadTextLines(lp_file, plan.sha256_of_input);
   if (!lines) {

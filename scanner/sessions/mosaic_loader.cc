@@ -237,7 +237,7 @@ Status DecodeAll(const fs::path& scratch_dir, const Task& task, Decoding& decodi
 
 }  // namespace
 
-std::optional<std::string> WhyNoMosaics(const CapturePlan& plan) {
+std::optional<std::string> WhyNoMosaics(const ReadPlan& plan) {
   const auto is_raw = [](const FrameFile& file) { return IsRawName(file.path); };
   for (const LightFiles& files : plan.lit) {
     if (files.size() > 1) {
@@ -256,7 +256,7 @@ std::optional<std::string> WhyNoMosaics(const CapturePlan& plan) {
   return std::nullopt;
 }
 
-Result<LoadedMosaics> LoadMosaics(const CapturePlan& plan, const std::optional<SensorNoise>& noise,
+Result<LoadedMosaics> LoadMosaics(const ReadPlan& plan, const std::optional<SensorNoise>& noise,
                                   const fs::path& scratch_dir, const Task& task,
                                   const MosaicMemory& memory) {
   Decoding decoding{.memory = memory, .noise = noise};

@@ -25,7 +25,7 @@ struct LoadedMosaics {
 };
 
 // Why the frames of a capture cannot be solved from their mosaics; nothing where they can be.
-[[nodiscard]] std::optional<std::string> WhyNoMosaics(const CapturePlan& plan);
+[[nodiscard]] std::optional<std::string> WhyNoMosaics(const ReadPlan& plan);
 
 // How much of it lies in memory.
 struct MosaicMemory {
@@ -37,7 +37,7 @@ struct MosaicMemory {
 /// memory.readings they go to a scratch file in `scratch_dir`, row by row as the decoder has them.
 ///
 /// Errors  as LoadFrames(); kIo where the scratch file cannot be written, with the room it needs
-[[nodiscard]] Result<LoadedMosaics> LoadMosaics(const CapturePlan& plan,
+[[nodiscard]] Result<LoadedMosaics> LoadMosaics(const ReadPlan& plan,
                                                 const std::optional<SensorNoise>& noise,
                                                 const std::filesystem::path& scratch_dir,
                                                 const Task& task, const MosaicMemory& memory = {});

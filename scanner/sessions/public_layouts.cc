@@ -17,7 +17,7 @@ struct DiligentTables {
   std::vector<TextLine> names;
 };
 
-Result<DiligentTables> ReadDiligentTables(const fs::path& dir, CapturePlan& plan) {
+Result<DiligentTables> ReadDiligentTables(const fs::path& dir, ReadPlan& plan) {
   Result<std::vector<NumberRow>> directions =
       ReadNumberRows(dir / "light_directions.txt", plan.sha256_of_input);
   if (!directions) {
@@ -50,7 +50,7 @@ Status CheckDiligentTables(const DiligentTables& tables, const fs::path& dir) {
 
 // The photographs of a folder. Cameras write RAW and JPEG side by side: RAW files count where there
 // is nothing else, and are otherwise left out with a warning.
-std::vector<std::string> SelectImages(const std::vector<std::string>& names, CapturePlan& plan) {
+std::vector<std::string> SelectImages(const std::vector<std::string>& names, ReadPlan& plan) {
   std::vector<std::string> images;
   std::vector<std::string> raws;
   for (const std::string& name : names) {
@@ -77,8 +77,8 @@ std::vector<std::string> SelectImages(const std::vector<std::string>& names, Cap
 
 fs::path ParentOf(const fs::path& dir) { return (dir / "..").lexically_normal(); }
 
-Result<CapturePlan> PlanDiligent(const fs::path& dir) {
-  CapturePlan plan;
+Result<ReadPlan> PlanDiligent(const fs::path& dir) {
+  ReadPlan plan;
   plan.layout = "diligent";
   const Result<DiligentTables> tables = ReadDiligentTables(dir, plan);
   if (!tables) {
@@ -104,8 +104,8 @@ Result<CapturePlan> PlanDiligent(const fs::path& dir) {
   return plan;
 }
 
-Result<CapturePlan> PlanLightsFolder(const fs::path& dir, const fs::path& lights_file) {
-  CapturePlan plan;
+Result<ReadPlan> PlanLightsFolder(const fs::path& dir, const fs::path& lights_file) {
+  ReadPlan plan;
   plan.layout = "lights.txt";
   const Result<std::vector<std::string>> names = FilesInNaturalOrder(dir);
   if (!names) {
@@ -134,8 +134,8 @@ Result<CapturePlan> PlanLightsFolder(const fs::path& dir, const fs::path& lights
   return plan;
 }
 
-Result<CapturePlan> PlanPhotographs(const fs::path& dir) {
-  CapturePlan plan;
+Result<ReadPlan> PlanPhotographs(const fs::path& dir) {
+  ReadPlan plan;
   plan.layout = "photographs";
   Result<std::vector<std::string>> names = FilesInNaturalOrder(dir);
   if (!names) {
@@ -162,7 +162,7 @@ Result<CapturePlan> PlanPhotographs(const fs::path& dir) {
 }
 
 Status FindCompanions(const fs::path& dir, const fs::path& shared_dir, bool find_mask,
-                      CapturePlan& plan) {
+                      ReadPlan& plan) {
   plan.truth = FindPublicTruth(dir);
   if (!plan.truth) {
     plan.truth = FindPublicTruth(shared_dir);

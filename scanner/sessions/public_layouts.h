@@ -11,22 +11,22 @@ namespace sateen {
 // the image, z to the viewer.
 
 // A DiLiGenT folder: light_directions.txt, light_intensities.txt (RGB to divide by), filenames.txt.
-[[nodiscard]] Result<CapturePlan> PlanDiligent(const std::filesystem::path& dir);
+[[nodiscard]] Result<ReadPlan> PlanDiligent(const std::filesystem::path& dir);
 
 // A folder of images in natural order, one for each light of `lights_file` (ReadLightTable).
-[[nodiscard]] Result<CapturePlan> PlanLightsFolder(const std::filesystem::path& dir,
-                                                   const std::filesystem::path& lights_file);
+[[nodiscard]] Result<ReadPlan> PlanLightsFolder(const std::filesystem::path& dir,
+                                                const std::filesystem::path& lights_file);
 
 // A folder of photographs in natural order, one for each light, whose lights are told or found
 // elsewhere: until then they are named after the files and shine from straight above. The folder's
 // own mask counts; a reference picture (IsReferenceName) is no frame.
-[[nodiscard]] Result<CapturePlan> PlanPhotographs(const std::filesystem::path& dir);
+[[nodiscard]] Result<ReadPlan> PlanPhotographs(const std::filesystem::path& dir);
 
 // Adds to `plan` the mask (unless `find_mask` is false) and the truth that lie in `dir`; else the
 // mask.* one folder up, and the truth in `shared_dir`: data sets of several folders keep one.
 [[nodiscard]] Status FindCompanions(const std::filesystem::path& dir,
                                     const std::filesystem::path& shared_dir, bool find_mask,
-                                    CapturePlan& plan);
+                                    ReadPlan& plan);
 
 // One folder up: what "dir/.." names, also for "." and "dir/".
 [[nodiscard]] std::filesystem::path ParentOf(const std::filesystem::path& dir);

@@ -34,8 +34,8 @@ struct RepeatedLight {
   FrameFile again;
 };
 
-// What a layout says about a capture, before any pixel is read.
-struct CapturePlan {
+// What a layout says about a dataset, before any pixel is read.
+struct ReadPlan {
   std::string layout;
   Rig rig;
   std::vector<LightFiles> lit;  // [light of the rig]; empty where the session has no frame of it

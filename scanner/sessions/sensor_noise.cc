@@ -192,7 +192,7 @@ Result<SensorNoise> MeasureNoise(const RepeatedLight& repeated, const std::vecto
 
 }  // namespace
 
-Result<std::optional<SensorNoise>> FindSensorNoise(const CapturePlan& plan, const Task& task) {
+Result<std::optional<SensorNoise>> FindSensorNoise(const ReadPlan& plan, const Task& task) {
   const std::optional<Response>& response = plan.rig.response;
   if (response && response->gain_dn_per_electron && response->read_noise_dn) {
     return SensorNoise{.gain_dn = *response->gain_dn_per_electron,

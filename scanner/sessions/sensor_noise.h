@@ -32,7 +32,7 @@ struct SensorNoise {
 ///          the brightness, as that of a simulation may not, or more than noise, as where the cloth moved
 /// Errors   as TakeRawReadings()
 /// Cost     decodes two pairs of frames, and looks at 64 rows of tiles at most
-[[nodiscard]] Result<std::optional<SensorNoise>> FindSensorNoise(const CapturePlan& plan,
+[[nodiscard]] Result<std::optional<SensorNoise>> FindSensorNoise(const ReadPlan& plan,
                                                                  const Task& task = {});
 
 }  // namespace sateen

@@ -16,7 +16,7 @@ constexpr double kOtherLens = 0.1;       // of the focal length
 constexpr double kOtherPlaceMm = 150.0;  // no ruler is so wrong
 
 Status ReadRigInto(const fs::path& path, const std::optional<std::string>& recorded_sha256,
-                   CapturePlan& plan) {
+                   ReadPlan& plan) {
   const Result<std::string> hash = Sha256OfFile(path);
   if (!hash) {
     return tl::unexpected(hash.error());
@@ -94,13 +94,13 @@ Status CheckSettings(const Session& session, const std::string& where) {
   return {};
 }
 
-FrameFile FileOf(const fs::path& dir, const SessionFrame& frame, const CapturePlan& plan) {
+FrameFile FileOf(const fs::path& dir, const SessionFrame& frame, const ReadPlan& plan) {
   return {dir / frame.file, frame.Exposure(), frame.sha256, plan.rig.response,
           frame.shift_px.value_or(Eigen::Vector2d::Zero())};
 }
 
 // Puts each frame at the place of its light.
-Status AssignFrames(const fs::path& dir, CapturePlan& plan) {
+Status AssignFrames(const fs::path& dir, ReadPlan& plan) {
   const std::string where = (dir / "session.json").string();
   plan.lit.resize(plan.rig.lights.size());
   for (const SessionFrame& frame : plan.session->frames) {
@@ -128,7 +128,7 @@ Status AssignFrames(const fs::path& dir, CapturePlan& plan) {
 
 // A light's frame and its repeat, which ReadSession() leaves out; nothing where they are not camera RAW
 // of one exposure.
-Result<std::optional<RepeatedLight>> FindRepeat(const fs::path& dir, const CapturePlan& plan) {
+Result<std::optional<RepeatedLight>> FindRepeat(const fs::path& dir, const ReadPlan& plan) {
   const Result<Session> record = ReadSessionRecord(dir);
   if (!record) {
     return tl::unexpected(record.error());
@@ -182,7 +182,7 @@ std::vector<std::string> DifferencesOf(const Rig& given, const Rig& own) {
   return differences;
 }
 
-void WarnOfOtherRig(const fs::path& dir, const fs::path& rig_file, CapturePlan& plan) {
+void WarnOfOtherRig(const fs::path& dir, const fs::path& rig_file, ReadPlan& plan) {
   const Result<Rig> own = ReadRig(dir / plan.session->rig);
   if (!own) {
     return;  // the one that is given stands in for it
@@ -195,8 +195,8 @@ void WarnOfOtherRig(const fs::path& dir, const fs::path& rig_file, CapturePlan& 
 
 }  // namespace
 
-Result<CapturePlan> PlanSessionRig(const fs::path& dir, const ReadCaptureOptions& options) {
-  CapturePlan plan;
+Result<ReadPlan> PlanSessionRig(const fs::path& dir, const ReadDatasetOptions& options) {
+  ReadPlan plan;
   plan.layout = "session";
   const Result<Session> session = ReadSession(dir);
   if (!session) {
@@ -217,8 +217,8 @@ Result<CapturePlan> PlanSessionRig(const fs::path& dir, const ReadCaptureOptions
   return plan;
 }
 
-Result<CapturePlan> PlanSession(const fs::path& dir, const ReadCaptureOptions& options) {
-  Result<CapturePlan> plan = PlanSessionRig(dir, options);
+Result<ReadPlan> PlanSession(const fs::path& dir, const ReadDatasetOptions& options) {
+  Result<ReadPlan> plan = PlanSessionRig(dir, options);
   if (!plan) {
     return plan;
   }

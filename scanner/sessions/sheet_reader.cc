@@ -4,10 +4,10 @@
 #include <utility>
 
 #include "core/parallel.h"
+#include "scanner/sessions/dataset.h"
 #include "scanner/sessions/session_layout.h"
 #include "scanner/sessions/sheet_blocks.h"
 #include "scanner/sessions/sheet_frames.h"
-#include "scanner/sessions/stack_reader.h"
 
 namespace sateen {
 namespace {
@@ -85,7 +85,7 @@ void AddSamples(const std::vector<BlockSample>& blocks, const Places& places, si
 }
 
 // By the border of the sheet, in the frame of each light that is `usable`.
-Status FindPose(const std::filesystem::path& dir, const CapturePlan& plan,
+Status FindPose(const std::filesystem::path& dir, const ReadPlan& plan,
                 const std::vector<std::optional<size_t>>& usable, const SheetBorder& border,
                 const Task& task, Sheet& sheet) {
   std::vector<FrameFile> lit;
@@ -116,7 +116,7 @@ Status FindPose(const std::filesystem::path& dir, const CapturePlan& plan,
   return {};
 }
 
-Status CheckPlan(const std::filesystem::path& dir, const CapturePlan& plan, bool allow_missing) {
+Status CheckPlan(const std::filesystem::path& dir, const ReadPlan& plan, bool allow_missing) {
   if (plan.session->kind != SessionKind::kSheet) {
     return Fail(ErrorCode::kBadData, "{}: is a session of kind '{}'; need a sheet", dir.string(),
                 Name(plan.session->kind));
@@ -138,7 +138,7 @@ Status CheckPlan(const std::filesystem::path& dir, const CapturePlan& plan, bool
 
 class SheetReader {
  public:
-  SheetReader(const std::filesystem::path& dir, const ReadSheetOptions& options, CapturePlan plan,
+  SheetReader(const std::filesystem::path& dir, const ReadSheetOptions& options, ReadPlan plan,
               const Task& task)
       : dir_(dir), options_(options), plan_(std::move(plan)), task_(task) {}
 
@@ -273,7 +273,7 @@ class SheetReader {
 
   const std::filesystem::path dir_;
   const ReadSheetOptions options_;
-  const CapturePlan plan_;
+  const ReadPlan plan_;
   const Task task_;
   std::vector<Eigen::Vector3d> dark_;
   std::vector<std::pair<size_t, const FrameFile*>> files_;  // with the light, longest first
@@ -289,7 +289,7 @@ class SheetReader {
 
 Result<Sheet> ReadSheet(const std::filesystem::path& dir, const ReadSheetOptions& options,
                         const Task& task) {
-  Result<CapturePlan> plan = PlanSession(dir, {.rig_file = options.rig_file});
+  Result<ReadPlan> plan = PlanSession(dir, {.rig_file = options.rig_file});
   if (!plan) {
     return tl::unexpected(plan.error());
   }

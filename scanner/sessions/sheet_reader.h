@@ -53,7 +53,7 @@ struct Sheet {
 /// is tens of pixels wide and paper has no texture, so that a pixel moves its mean by less than 1e-3
 /// of what neighbouring blocks differ by.
 ///
-/// Errors   kIo, kBadData: as ReadCapture(); the session is of another kind; the rig has no camera; a
+/// Errors   kIo, kBadData: as ReadDataset(); the session is of another kind; the rig has no camera; a
 ///          light without a frame; a frame that is saturated or dark over more than half of the sheet
 ///          kDegenerate: as FitSheetPose(), with the session's folder; kCancelled
 [[nodiscard]] Result<Sheet> ReadSheet(const std::filesystem::path& dir,

@@ -52,7 +52,7 @@ Result<Image<float>> ReadSites(const FrameFile& file, const Sensor& sensor, Imag
 }
 
 // The session's frames: one of each light, then the dark ones.
-Result<std::vector<FrameFile>> FramesOf(const fs::path& dir, const CapturePlan& plan) {
+Result<std::vector<FrameFile>> FramesOf(const fs::path& dir, const ReadPlan& plan) {
   if (!plan.rig.camera || plan.rig.lights.empty()) {
     return Fail(ErrorCode::kBadData, "{}: its rig has no {}; need a rig with both", dir.string(),
                 plan.rig.camera ? "lights" : "camera");
@@ -86,7 +86,7 @@ Result<LitScene> ReadLitScene(const fs::path& dir, const Sensor& sensor, const T
   if (const Status status = sensor.Validate(); !status) {
     return tl::unexpected(status.error());
   }
-  Result<CapturePlan> plan = PlanSession(dir, {});
+  Result<ReadPlan> plan = PlanSession(dir, {});
   if (!plan) {
     return tl::unexpected(plan.error());
   }
@@ -128,7 +128,7 @@ Result<LitScene> ReadLitScene(const fs::path& dir, const Sensor& sensor, const T
 }
 
 Result<Rig> ReadSceneRig(const fs::path& dir) {
-  Result<CapturePlan> plan = PlanSessionRig(dir, {});
+  Result<ReadPlan> plan = PlanSessionRig(dir, {});
   if (!plan) {
     return tl::unexpected(plan.error());
   }

@@ -6,7 +6,7 @@
 
 #include "core/sha256.h"
 #include "tests/cli/cli_runner.h"
-#include "tests/scanner/sessions/captures.h"
+#include "tests/scanner/sessions/dataset_files.h"
 
 namespace sateen::session_test {
 namespace {

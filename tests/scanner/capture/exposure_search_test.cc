@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "tests/scanner/sessions/captures.h"
+#include "tests/scanner/sessions/dataset_files.h"
 
 namespace sateen::exposure_search_test {
 namespace {

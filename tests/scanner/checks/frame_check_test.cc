@@ -6,7 +6,7 @@
 
 #include "imaging/dng.h"
 #include "tests/scanner/checks/simulated_faults.h"
-#include "tests/scanner/sessions/captures.h"
+#include "tests/scanner/sessions/dataset_files.h"
 
 namespace sateen::frame_check_test {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "tests/scanner/sessions/captures.h"
+#include "tests/scanner/sessions/dataset_files.h"
 
 namespace sateen::folder_listing_test {
 namespace {

@@ -1,6 +1,6 @@
 #include "scanner/sessions/lp_layout.h"
 
-#include "tests/scanner/sessions/captures.h"
+#include "tests/scanner/sessions/dataset_files.h"
 
 namespace sateen::lp_layout_test {
 namespace {
@@ -24,57 +24,57 @@ void WriteThreeImages(const fs::path& dir) {
   WriteFlat(dir / "c.exr", 0.3F);
 }
 
-Result<Capture> ReadLp(const std::string& text) {
+Result<Dataset> ReadLp(const std::string& text) {
   const TempFolder temp;
   WriteThreeImages(temp.Path());
   WriteFlat(temp.Path() / "b 2  final.exr", 0.2F);
   WriteFlat(temp.Path() / "sub/a.exr", 0.1F);
   WriteText(temp.Path() / "dome.lp", text);
-  return ReadCapture(temp.Path() / "dome.lp", {});
+  return ReadDataset(temp.Path() / "dome.lp", {});
 }
 
 Error FailureOfLp(const std::string& text) {
-  const Result<Capture> capture = ReadLp(text);
-  EXPECT_FALSE(capture) << text;
-  return capture ? Error{} : capture.error();
+  const Result<Dataset> dataset = ReadLp(text);
+  EXPECT_FALSE(dataset) << text;
+  return dataset ? Error{} : dataset.error();
 }
 
 TEST(Lp, ReadsTheLinesInTheirOrder) {
-  const Result<Capture> capture = ReadLp(kThreeLines);
-  ASSERT_TRUE(capture) << capture.error().message;
-  EXPECT_EQ(capture->layout, "lp");
-  ASSERT_THAT(capture->stack, SizeIs(3));
-  EXPECT_FLOAT_EQ(capture->stack[1].rgb[0].At(0, 0), 0.2F);
-  EXPECT_LT((capture->rig.lights[1].direction - Eigen::Vector3d(-0.6, 0, 0.8)).norm(), 1e-15);
-  EXPECT_EQ(capture->rig.lights[1].flux_rgb, Eigen::Vector3d::Ones());
-  EXPECT_THAT(capture->warnings, IsEmpty());
+  const Result<Dataset> dataset = ReadLp(kThreeLines);
+  ASSERT_TRUE(dataset) << dataset.error().message;
+  EXPECT_EQ(dataset->layout, "lp");
+  ASSERT_THAT(dataset->stack, SizeIs(3));
+  EXPECT_FLOAT_EQ(dataset->stack[1].rgb[0].At(0, 0), 0.2F);
+  EXPECT_LT((dataset->rig.lights[1].direction - Eigen::Vector3d(-0.6, 0, 0.8)).norm(), 1e-15);
+  EXPECT_EQ(dataset->rig.lights[1].flux_rgb, Eigen::Vector3d::Ones());
+  EXPECT_THAT(dataset->warnings, IsEmpty());
 }
 
 TEST(Lp, AcceptsNamesWithBlanksAndPathsOfAnotherMachine) {
-  const Result<Capture> capture = ReadLp(
+  const Result<Dataset> dataset = ReadLp(
       "\xEF\xBB\xBF"
       "3\r\n"
       "C:\\Users\\me\\RTI run\\a.exr\t0.6 0 0.8\r\n"
       "b 2  final.exr -0.6 0 0.8\r\n"
       "/home/me/c.exr 0 0.6 0.8\r\n\r\n");
-  ASSERT_TRUE(capture) << capture.error().message;
-  EXPECT_THAT(capture->stack[0].name, HasSubstr("/a.exr"));
-  EXPECT_THAT(capture->stack[1].name, HasSubstr("/b 2  final.exr"));
-  EXPECT_THAT(capture->stack[2].name, HasSubstr("/c.exr"));
+  ASSERT_TRUE(dataset) << dataset.error().message;
+  EXPECT_THAT(dataset->stack[0].name, HasSubstr("/a.exr"));
+  EXPECT_THAT(dataset->stack[1].name, HasSubstr("/b 2  final.exr"));
+  EXPECT_THAT(dataset->stack[2].name, HasSubstr("/c.exr"));
 }
 
 TEST(Lp, PrefersThePathThatExists) {
-  const Result<Capture> capture = ReadLp("1\nsub\\a.exr 0.6 0 0.8\n");
-  ASSERT_TRUE(capture) << capture.error().message;
-  EXPECT_THAT(capture->stack[0].name, HasSubstr("sub/a.exr"));
+  const Result<Dataset> dataset = ReadLp("1\nsub\\a.exr 0.6 0 0.8\n");
+  ASSERT_TRUE(dataset) << dataset.error().message;
+  EXPECT_THAT(dataset->stack[0].name, HasSubstr("sub/a.exr"));
 }
 
 TEST(Lp, NormalisesPositionsAndSaysSoOnce) {
-  const Result<Capture> capture = ReadLp("2\na.exr 300 0 400\nb.exr -30 0 40\n");
-  ASSERT_TRUE(capture) << capture.error().message;
-  EXPECT_LT((capture->rig.lights[0].direction - Eigen::Vector3d(0.6, 0, 0.8)).norm(), 1e-15);
-  ASSERT_THAT(capture->warnings, SizeIs(1));
-  EXPECT_THAT(capture->warnings[0], HasSubstr("2 of 2 lights are given by a position"));
+  const Result<Dataset> dataset = ReadLp("2\na.exr 300 0 400\nb.exr -30 0 40\n");
+  ASSERT_TRUE(dataset) << dataset.error().message;
+  EXPECT_LT((dataset->rig.lights[0].direction - Eigen::Vector3d(0.6, 0, 0.8)).norm(), 1e-15);
+  ASSERT_THAT(dataset->warnings, SizeIs(1));
+  EXPECT_THAT(dataset->warnings[0], HasSubstr("2 of 2 lights are given by a position"));
 }
 
 TEST(Lp, TakesTheMaskBesideIt) {
@@ -82,9 +82,9 @@ TEST(Lp, TakesTheMaskBesideIt) {
   WriteThreeImages(temp.Path());
   WriteText(temp.Path() / "dome.LP", kThreeLines);
   testing::WriteMask(temp.Path() / "mask.png");
-  const Result<Capture> capture = ReadCapture(temp.Path() / "dome.LP", {});
-  ASSERT_TRUE(capture) << capture.error().message;
-  EXPECT_TRUE(capture->mask);
+  const Result<Dataset> dataset = ReadDataset(temp.Path() / "dome.LP", {});
+  ASSERT_TRUE(dataset) << dataset.error().message;
+  EXPECT_TRUE(dataset->mask);
 }
 
 TEST(Lp, RefusesEachLineThatIsWrong) {

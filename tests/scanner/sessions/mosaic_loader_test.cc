@@ -3,9 +3,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "scanner/sessions/stack_reader.h"
+#include "scanner/sessions/dataset.h"
 #include "tests/imaging/dng.h"
-#include "tests/scanner/sessions/captures.h"
+#include "tests/scanner/sessions/dataset_files.h"
 #include "tests/testing/full_disk.h"
 
 namespace sateen::mosaic_loader_test {
@@ -49,7 +49,7 @@ class MosaicLoader : public ::testing::Test {
   [[nodiscard]] std::string WhyNot() const { return WhyNoMosaics(plan_).value_or(""); }
 
   testing::TempFolder temp_;
-  CapturePlan plan_;
+  ReadPlan plan_;
   SensorNoise noise_{.gain_dn = 0.25, .read_dn = 3.0, .source = "the rig"};
 };
 
@@ -137,9 +137,9 @@ TEST_F(MosaicLoader, RadianceIsThatOfInterpolatedColoursAtTheSitesOwn) {
   for (int k = 4; k < 6; ++k) {
     std::filesystem::remove(Path(k));
   }
-  const Capture rgb = ReadCapture(temp_.Path(), {}).value();
-  const Capture raw =
-      ReadCapture(temp_.Path(), {.domain = Domain::kRaw, .by_noise = false}).value();
+  const Dataset rgb = ReadDataset(temp_.Path(), {}).value();
+  const Dataset raw =
+      ReadDataset(temp_.Path(), {.domain = Domain::kRaw, .by_noise = false}).value();
   ASSERT_TRUE(raw.mosaics);
   EXPECT_TRUE(raw.stack.empty());
   EXPECT_EQ(raw.Size(), rgb.Size());
@@ -157,7 +157,7 @@ TEST_F(MosaicLoader, RadianceIsThatOfInterpolatedColoursAtTheSitesOwn) {
     }
   }
   // Nothing tells of the noise but what the solve itself will find.
-  EXPECT_FALSE(ReadCapture(temp_.Path(), {.domain = Domain::kRaw}).value().mosaics->noise);
+  EXPECT_FALSE(ReadDataset(temp_.Path(), {.domain = Domain::kRaw}).value().mosaics->noise);
 }
 
 }  // namespace

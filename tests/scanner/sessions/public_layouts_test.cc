@@ -1,6 +1,6 @@
 #include "scanner/sessions/public_layouts.h"
 
-#include "tests/scanner/sessions/captures.h"
+#include "tests/scanner/sessions/dataset_files.h"
 
 namespace sateen::public_layouts_test {
 namespace {
@@ -18,14 +18,14 @@ using testing::TempFolder;
 using testing::WriteFlat;
 using testing::WriteText;
 
-void ExpectFourFrames(const Capture& capture) {
-  ASSERT_THAT(capture.stack, SizeIs(4));
-  ASSERT_THAT(capture.rig.lights, SizeIs(4));
+void ExpectFourFrames(const Dataset& dataset) {
+  ASSERT_THAT(dataset.stack, SizeIs(4));
+  ASSERT_THAT(dataset.rig.lights, SizeIs(4));
   for (size_t k = 0; k < 4; ++k) {
-    EXPECT_FLOAT_EQ(capture.stack[k].rgb[1].At(2, 1), 0.1F * static_cast<float>(k + 1));
-    EXPECT_EQ(capture.rig.lights[k].model, LightModel::kDistant);
+    EXPECT_FLOAT_EQ(dataset.stack[k].rgb[1].At(2, 1), 0.1F * static_cast<float>(k + 1));
+    EXPECT_EQ(dataset.rig.lights[k].model, LightModel::kDistant);
   }
-  EXPECT_NEAR((capture.rig.lights[3].direction - Eigen::Vector3d(0, -0.6, 0.8)).norm(), 0, 1e-15);
+  EXPECT_NEAR((dataset.rig.lights[3].direction - Eigen::Vector3d(0, -0.6, 0.8)).norm(), 0, 1e-15);
 }
 
 // The error of a folder whose lights.txt holds `text`.
@@ -39,11 +39,11 @@ Error FailureOfLights(const std::string& text) {
 TEST(Diligent, ReadsFramesByNameAndDividesByIntensities) {
   const TempFolder temp;
   testing::WriteDiligent(temp.Path());
-  const Capture capture = MustRead(temp.Path());
-  EXPECT_EQ(capture.layout, "diligent");
-  ExpectFourFrames(capture);
-  EXPECT_EQ(capture.rig.lights[2].flux_rgb, Eigen::Vector3d(3, 6, 9));
-  EXPECT_THAT(capture.stack[0].name, HasSubstr("b.exr"));
+  const Dataset dataset = MustRead(temp.Path());
+  EXPECT_EQ(dataset.layout, "diligent");
+  ExpectFourFrames(dataset);
+  EXPECT_EQ(dataset.rig.lights[2].flux_rgb, Eigen::Vector3d(3, 6, 9));
+  EXPECT_THAT(dataset.stack[0].name, HasSubstr("b.exr"));
 }
 
 TEST(Diligent, NamesTheCountsThatDiffer) {
@@ -85,11 +85,11 @@ TEST(Diligent, RefusesAFileThatServesTwoLights) {
 TEST(LightsFolder, ReadsImagesInNaturalOrder) {
   const TempFolder temp;
   testing::WriteLightsFolder(temp.Path());  // im.8, im.9, im.10, im.11
-  const Capture capture = MustRead(temp.Path());
-  EXPECT_EQ(capture.layout, "lights.txt");
-  ExpectFourFrames(capture);
-  EXPECT_EQ(capture.rig.lights[0].flux_rgb, Eigen::Vector3d::Ones());
-  EXPECT_THAT(capture.warnings, IsEmpty());
+  const Dataset dataset = MustRead(temp.Path());
+  EXPECT_EQ(dataset.layout, "lights.txt");
+  ExpectFourFrames(dataset);
+  EXPECT_EQ(dataset.rig.lights[0].flux_rgb, Eigen::Vector3d::Ones());
+  EXPECT_THAT(dataset.warnings, IsEmpty());
 }
 
 TEST(LightsFolder, ReadsLightsOneFolderUpHoweverThePathIsWritten) {
@@ -123,9 +123,9 @@ TEST(LightsFolder, AcceptsIntensities) {
   testing::WriteLightsFolder(temp.Path());
   WriteText(temp.Path() / "lights.txt",
             "0.6 0 0.8 1 2 3\n-0.6 0 0.8 1 2 3\n0 0.6 0.8 1 2 3\n0 -0.6 0.8 4 5 6\n");
-  const Capture capture = MustRead(temp.Path());
-  ExpectFourFrames(capture);
-  EXPECT_EQ(capture.rig.lights[3].flux_rgb, Eigen::Vector3d(4, 5, 6));
+  const Dataset dataset = MustRead(temp.Path());
+  ExpectFourFrames(dataset);
+  EXPECT_EQ(dataset.rig.lights[3].flux_rgb, Eigen::Vector3d(4, 5, 6));
 }
 
 TEST(LightsFolder, NormalisesWhatIsRounded) {
@@ -170,10 +170,10 @@ TEST(LightsFolder, LeavesOutTruthMasksAndHiddenFiles) {
   ASSERT_TRUE(WriteExr(temp.Path() / "normal_gt.exr", testing::LevelNormals()));
   testing::WriteMask(temp.Path() / "im.mask.png");
   testing::WriteMask(temp.Path() / "Normal_gt.png");
-  const Capture capture = MustRead(temp.Path());
-  ExpectFourFrames(capture);
-  EXPECT_TRUE(capture.mask);
-  EXPECT_TRUE(capture.truth);
+  const Dataset dataset = MustRead(temp.Path());
+  ExpectFourFrames(dataset);
+  EXPECT_TRUE(dataset.mask);
+  EXPECT_TRUE(dataset.truth);
 }
 
 TEST(LightsFolder, WarnsOnceOfRawFilesLeftOut) {
@@ -181,9 +181,9 @@ TEST(LightsFolder, WarnsOnceOfRawFilesLeftOut) {
   testing::WriteLightsFolder(temp.Path());
   WriteText(temp.Path() / "im.8.nef", "");
   WriteText(temp.Path() / "im.9.nef", "");
-  const Capture capture = MustRead(temp.Path());
-  ASSERT_THAT(capture.warnings, SizeIs(1));
-  EXPECT_THAT(capture.warnings[0], HasSubstr("2 camera RAW files were left out"));
+  const Dataset dataset = MustRead(temp.Path());
+  ASSERT_THAT(dataset.warnings, SizeIs(1));
+  EXPECT_THAT(dataset.warnings[0], HasSubstr("2 camera RAW files were left out"));
 }
 
 TEST(LightsFolder, SaysWhatIsThereInsteadOfPhotographs) {
@@ -200,20 +200,20 @@ TEST(LightsFolder, TakesMaskAndTruthOneFolderUp) {
   fs::rename(temp.Path() / "specular/lights.txt", temp.Path() / "lights.txt");
   testing::WriteMask(temp.Path() / "mask.png");
   ASSERT_TRUE(WriteExr(temp.Path() / "normal_gt.exr", testing::LevelNormals()));
-  const Capture capture = MustRead(temp.Path() / "specular");
-  EXPECT_TRUE(capture.mask);
-  ASSERT_TRUE(capture.truth);
-  EXPECT_THAT(capture.truth->source, HasSubstr("normal_gt.exr"));
+  const Dataset dataset = MustRead(temp.Path() / "specular");
+  EXPECT_TRUE(dataset.mask);
+  ASSERT_TRUE(dataset.truth);
+  EXPECT_THAT(dataset.truth->source, HasSubstr("normal_gt.exr"));
 }
 
 TEST(LightsFolder, LeavesOutASharedMaskThatDoesNotFit) {
   const TempFolder temp;
   testing::WriteLightsFolder(temp.Path() / "cat");
   testing::WriteMask(temp.Path() / "mask.png", {8, 8});
-  const Capture capture = MustRead(temp.Path() / "cat");
-  EXPECT_FALSE(capture.mask);
-  ASSERT_THAT(capture.warnings, SizeIs(1));
-  EXPECT_THAT(capture.warnings[0], HasSubstr("the mask was left out"));
+  const Dataset dataset = MustRead(temp.Path() / "cat");
+  EXPECT_FALSE(dataset.mask);
+  ASSERT_THAT(dataset.warnings, SizeIs(1));
+  EXPECT_THAT(dataset.warnings[0], HasSubstr("the mask was left out"));
 }
 
 }  // namespace

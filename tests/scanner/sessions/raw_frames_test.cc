@@ -1,9 +1,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "scanner/sessions/stack_reader.h"
+#include "scanner/sessions/dataset.h"
 #include "tests/imaging/dng.h"
-#include "tests/scanner/sessions/captures.h"
+#include "tests/scanner/sessions/dataset_files.h"
 
 namespace sateen::raw_frames_test {
 namespace {
@@ -11,12 +11,12 @@ namespace {
 // A folder of four equal DNG files and their lights.txt.
 class RawFrames : public ::testing::Test {
  protected:
-  Result<Capture> Read(const testing::DngSpec& spec) {
+  Result<Dataset> Read(const testing::DngSpec& spec) {
     testing::WriteText(temp_.Path() / "lights.txt", testing::Lines(testing::kDirections));
     for (int k = 0; k < 4; ++k) {
       testing::WriteText(temp_.Path() / fmt::format("frame{}.dng", k), testing::DngBytes(spec));
     }
-    return ReadCapture(temp_.Path(), {});
+    return ReadDataset(temp_.Path(), {});
   }
 
  private:
@@ -26,13 +26,13 @@ class RawFrames : public ::testing::Test {
 TEST_F(RawFrames, ComeAsCameraRgbWithBlackSubtractedAndWhiteAtOne) {
   const testing::DngSpec spec;
 
-  const Capture capture = Read(spec).value();
+  const Dataset dataset = Read(spec).value();
 
-  ASSERT_EQ(capture.stack.size(), 4U);
-  EXPECT_EQ(capture.stack[0].full_scale, 1.0F);
+  ASSERT_EQ(dataset.stack.size(), 4U);
+  EXPECT_EQ(dataset.stack[0].full_scale, 1.0F);
   // Site (20, 10) is red in RGGB and keeps what was measured.
   const float expected = static_cast<float>(testing::Reading(20, 10) - 100) / (4000.0F - 100.0F);
-  EXPECT_NEAR(capture.stack[2].rgb[0].At(20, 10), expected, 1e-6F);
+  EXPECT_NEAR(dataset.stack[2].rgb[0].At(20, 10), expected, 1e-6F);
 }
 
 TEST_F(RawFrames, ASaturatedSiteSaturatesEveryPixelThatItHasAPartIn) {

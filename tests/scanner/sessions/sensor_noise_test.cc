@@ -46,8 +46,8 @@ class SensorNoiseTest : public ::testing::Test {
     EXPECT_TRUE(WriteDng(path, mosaic, {.black = kBlack, .white = 16000.0}));
     return {.path = path};
   }
-  CapturePlan PlanOf(const Exposure& first, const Exposure& again) {
-    CapturePlan plan;
+  ReadPlan PlanOf(const Exposure& first, const Exposure& again) {
+    ReadPlan plan;
     plan.repeated = {Write("first.dng", first), Write("again.dng", again)};
     plan.dark = {Write("dark-first.dng", {}), Write("dark-last.dng", {})};
     return plan;
@@ -59,7 +59,7 @@ class SensorNoiseTest : public ::testing::Test {
 
 TEST_F(SensorNoiseTest, IsThatOfTheSensorThoughTheLightDrifted) {
   // Drift and the stripes alone would double the variance of the brightest tiles.
-  const CapturePlan plan = PlanOf({.brightness = 1.0}, {.brightness = 0.96});
+  const ReadPlan plan = PlanOf({.brightness = 1.0}, {.brightness = 0.96});
   const std::optional<SensorNoise> noise = FindSensorNoise(plan).value();
   ASSERT_TRUE(noise);
   EXPECT_NEAR(noise->gain_dn, kGain, 0.03 * kGain);
@@ -69,7 +69,7 @@ TEST_F(SensorNoiseTest, IsThatOfTheSensorThoughTheLightDrifted) {
 }
 
 TEST_F(SensorNoiseTest, ATenthOfThePictureThatMovedDoesNoHarm) {
-  const CapturePlan plan = PlanOf({.brightness = 1.0}, {.brightness = 1.0, .right_px = 2.0});
+  const ReadPlan plan = PlanOf({.brightness = 1.0}, {.brightness = 1.0, .right_px = 2.0});
   const std::optional<SensorNoise> noise = FindSensorNoise(plan).value();
   ASSERT_TRUE(noise);
   EXPECT_NEAR(noise->gain_dn, kGain, 0.03 * kGain);  // it is all of the brightest groups
@@ -77,13 +77,13 @@ TEST_F(SensorNoiseTest, ATenthOfThePictureThatMovedDoesNoHarm) {
 
 // Half a pixel: what would be taken for noise is three times what there is.
 TEST_F(SensorNoiseTest, APictureThatMovedAsAWholeTellsNothing) {
-  const CapturePlan plan =
+  const ReadPlan plan =
       PlanOf({.brightness = 1.0}, {.brightness = 1.0, .right_px = 0.5, .moved_from = 0.0});
   EXPECT_FALSE(FindSensorNoise(plan).value());
 }
 
 TEST_F(SensorNoiseTest, ADarkPairOfDifferentTimesIsNoPair) {
-  CapturePlan plan = PlanOf({.brightness = 1.0}, {.brightness = 1.0});
+  ReadPlan plan = PlanOf({.brightness = 1.0}, {.brightness = 1.0});
   plan.dark.back().path = Write("other.dng", {.brightness = 0.5}).path;
   plan.dark.back().exposure = 2.0;
   const std::optional<SensorNoise> noise = FindSensorNoise(plan).value();
@@ -92,7 +92,7 @@ TEST_F(SensorNoiseTest, ADarkPairOfDifferentTimesIsNoPair) {
 }
 
 TEST_F(SensorNoiseTest, TheRigsWordComesFirst) {
-  CapturePlan plan = PlanOf({.brightness = 1.0}, {.brightness = 1.0});
+  ReadPlan plan = PlanOf({.brightness = 1.0}, {.brightness = 1.0});
   plan.rig.response.emplace();
   plan.rig.response->gain_dn_per_electron = 0.7;
   plan.rig.response->read_noise_dn = 1.5;
@@ -104,15 +104,15 @@ TEST_F(SensorNoiseTest, TheRigsWordComesFirst) {
 }
 
 TEST_F(SensorNoiseTest, WhatTellsNothingIsNotBelieved) {
-  EXPECT_FALSE(FindSensorNoise(CapturePlan()).value());
+  EXPECT_FALSE(FindSensorNoise(ReadPlan()).value());
   const Exposure still{.brightness = 1.0, .is_noisy = false};
-  CapturePlan plan = PlanOf(still, still);
+  ReadPlan plan = PlanOf(still, still);
   plan.dark = {Write("d0.dng", {.is_noisy = false}), Write("d1.dng", {.is_noisy = false})};
   EXPECT_FALSE(FindSensorNoise(plan).value());
 }
 
 TEST_F(SensorNoiseTest, ARepeatThatChangedSinceItsCaptureIsRefused) {
-  CapturePlan plan = PlanOf({.brightness = 1.0}, {.brightness = 1.0});
+  ReadPlan plan = PlanOf({.brightness = 1.0}, {.brightness = 1.0});
   plan.repeated->again.sha256 = std::string(64, '0');
   const Result<std::optional<SensorNoise>> noise = FindSensorNoise(plan);
   ASSERT_FALSE(noise);

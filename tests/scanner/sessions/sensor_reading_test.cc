@@ -5,8 +5,8 @@
 
 #include "imaging/dng.h"
 #include "scanner/sessions/block_means.h"
-#include "scanner/sessions/stack_reader.h"
-#include "tests/scanner/sessions/captures.h"
+#include "scanner/sessions/dataset.h"
+#include "tests/scanner/sessions/dataset_files.h"
 
 namespace sateen::sensor_reading_test {
 namespace {
@@ -113,13 +113,13 @@ TEST_F(SensorReadingTest, OtherFilesGetTheBalanceAlone) {
   testing::WriteSession(temp_.Path() / "s", session);
   testing::WriteText(temp_.Path() / "rig.json", RigToJson(rig));
 
-  const Capture capture = testing::MustRead(temp_.Path() / "s");
+  const Dataset dataset = testing::MustRead(temp_.Path() / "s");
 
   // 0.1 less the dark frame's 0.05.
-  EXPECT_NEAR(capture.stack[0].rgb[0].At(1, 1), 2.0F * 0.05F, 1e-6F);
-  EXPECT_NEAR(capture.stack[0].rgb[1].At(1, 1), 0.05F, 1e-6F);
-  EXPECT_NEAR(capture.stack[0].rgb[2].At(1, 1), 1.5F * 0.05F, 1e-6F);
-  EXPECT_TRUE(std::isinf(capture.stack[0].full_scale));
+  EXPECT_NEAR(dataset.stack[0].rgb[0].At(1, 1), 2.0F * 0.05F, 1e-6F);
+  EXPECT_NEAR(dataset.stack[0].rgb[1].At(1, 1), 0.05F, 1e-6F);
+  EXPECT_NEAR(dataset.stack[0].rgb[2].At(1, 1), 1.5F * 0.05F, 1e-6F);
+  EXPECT_TRUE(std::isinf(dataset.stack[0].full_scale));
 }
 
 }  // namespace

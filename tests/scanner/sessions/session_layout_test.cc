@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "core/sha256.h"
-#include "tests/scanner/sessions/captures.h"
+#include "tests/scanner/sessions/dataset_files.h"
 
 namespace sateen::session_layout_test {
 namespace {
@@ -24,7 +24,7 @@ using testing::WriteText;
 class SessionLayout : public ::testing::Test {
  protected:
   void Write(const Session& session) { testing::WriteSession(dir_, session); }
-  Capture MustRead(const ReadCaptureOptions& options = {}) {
+  Dataset MustRead(const ReadDatasetOptions& options = {}) {
     return testing::MustRead(dir_, options);
   }
   static float ValueOf(const LightFrame& frame) { return frame.rgb[0].At(1, 1); }
@@ -35,24 +35,24 @@ class SessionLayout : public ::testing::Test {
 
 TEST_F(SessionLayout, SubtractsTheDarkFrameAndKeepsTheRecord) {
   Write(FourLightSession());
-  const Capture capture = MustRead();
-  EXPECT_EQ(capture.layout, "session");
-  ASSERT_THAT(capture.stack, SizeIs(4));
+  const Dataset dataset = MustRead();
+  EXPECT_EQ(dataset.layout, "session");
+  ASSERT_THAT(dataset.stack, SizeIs(4));
   for (size_t k = 0; k < 4; ++k) {
-    EXPECT_FLOAT_EQ(ValueOf(capture.stack[k]), 0.1F * static_cast<float>(k + 1) - 0.05F);
+    EXPECT_FLOAT_EQ(ValueOf(dataset.stack[k]), 0.1F * static_cast<float>(k + 1) - 0.05F);
   }
-  EXPECT_EQ(capture.rig.lights[3].name, "south");
-  ASSERT_TRUE(capture.session);
-  EXPECT_THAT(capture.session->frames, SizeIs(5));
+  EXPECT_EQ(dataset.rig.lights[3].name, "south");
+  ASSERT_TRUE(dataset.session);
+  EXPECT_THAT(dataset.session->frames, SizeIs(5));
 }
 
 TEST_F(SessionLayout, FollowsTheOrderOfTheRigNotOfTheFrames) {
   Session session = FourLightSession();
   std::reverse(session.frames.begin(), session.frames.end());
   Write(session);
-  const Capture capture = MustRead();
-  EXPECT_FLOAT_EQ(ValueOf(capture.stack[0]), 0.05F);
-  EXPECT_THAT(capture.stack[0].name, HasSubstr("east.exr"));
+  const Dataset dataset = MustRead();
+  EXPECT_FLOAT_EQ(ValueOf(dataset.stack[0]), 0.05F);
+  EXPECT_THAT(dataset.stack[0].name, HasSubstr("east.exr"));
 }
 
 // The frames need not be there yet.
@@ -68,7 +68,7 @@ TEST_F(SessionLayout, FindsTheRepeatOfALightThatIsRawAndOfOneExposure) {
   session.frames.back().file = "frames/again.dng";
   fs::create_directories(dir_);
   WriteText(dir_ / "session.json", SessionToJson(session));
-  const CapturePlan plan = PlanSession(dir_, {}).value();
+  const ReadPlan plan = PlanSession(dir_, {}).value();
   ASSERT_TRUE(plan.repeated);
   EXPECT_EQ(plan.repeated->first.path, dir_ / "frames/west.dng");
   EXPECT_EQ(plan.repeated->again.path, dir_ / "frames/again.dng");
@@ -87,10 +87,10 @@ TEST_F(SessionLayout, DividesByExposureBeforeTheDarkFrameIsSubtracted) {
     frame.iso = frame.light == "west" ? 400 : 200;
   }
   Write(session);
-  const Capture capture = MustRead();
+  const Dataset dataset = MustRead();
   // H: east 0.5 * 2 / 4 = 0.25, west 0.5, dark 1 * 2 / 4 = 0.5.
-  EXPECT_FLOAT_EQ(ValueOf(capture.stack[0]), 0.1F / 0.25F - 0.05F / 0.5F);
-  EXPECT_FLOAT_EQ(ValueOf(capture.stack[1]), 0.2F / 0.5F - 0.05F / 0.5F);
+  EXPECT_FLOAT_EQ(ValueOf(dataset.stack[0]), 0.1F / 0.25F - 0.05F / 0.5F);
+  EXPECT_FLOAT_EQ(ValueOf(dataset.stack[1]), 0.2F / 0.5F - 0.05F / 0.5F);
 }
 
 TEST_F(SessionLayout, SubtractsTheMeanOfSeveralDarkFrames) {
@@ -112,11 +112,11 @@ TEST_F(SessionLayout, FullScaleIsRadianceAndSaturatedSamplesStayThere) {
   Image<uint16_t> plane(testing::kSize, 32768);
   plane.At(1, 1) = 65535;
   ASSERT_TRUE(WritePng16(dir_ / "frames/east.png", {plane, plane, plane}));
-  const Capture capture = MustRead();
-  EXPECT_FLOAT_EQ(capture.stack[0].full_scale, 2.0F);
-  EXPECT_EQ(ValueOf(capture.stack[0]), capture.stack[0].full_scale);
-  EXPECT_NEAR(capture.stack[0].rgb[0].At(0, 0), 1.0F - 0.1F, 2e-5F);  // 32768 / 65535 is not 1/2
-  EXPECT_TRUE(std::isinf(capture.stack[1].full_scale));
+  const Dataset dataset = MustRead();
+  EXPECT_FLOAT_EQ(dataset.stack[0].full_scale, 2.0F);
+  EXPECT_EQ(ValueOf(dataset.stack[0]), dataset.stack[0].full_scale);
+  EXPECT_NEAR(dataset.stack[0].rgb[0].At(0, 0), 1.0F - 0.1F, 2e-5F);  // 32768 / 65535 is not 1/2
+  EXPECT_TRUE(std::isinf(dataset.stack[1].full_scale));
 }
 
 TEST_F(SessionLayout, VerifiesHashesWhereTheyAreRecorded) {
@@ -185,13 +185,13 @@ TEST_F(Bracketed, AreMergedAsRadianceAndTheShortestSaysWhatSaturates) {
   Write(session_);
   WriteEast("east.png", 65535, 13107);       // 0.2 / 0.5 = 0.4
   WriteEast("east-long.png", 65535, 26214);  // 0.4 / 4 = 0.1
-  const Capture capture = MustRead();
-  ASSERT_THAT(capture.stack, SizeIs(4));
-  EXPECT_FLOAT_EQ(capture.stack[0].full_scale, 2.0F);
-  EXPECT_EQ(ValueOf(capture.stack[0]), 2.0F);
+  const Dataset dataset = MustRead();
+  ASSERT_THAT(dataset.stack, SizeIs(4));
+  EXPECT_FLOAT_EQ(dataset.stack[0].full_scale, 2.0F);
+  EXPECT_EQ(ValueOf(dataset.stack[0]), 2.0F);
   const float dark = 0.05F / 0.5F;
-  EXPECT_NEAR(capture.stack[0].rgb[0].At(0, 0), (0.4F * 0.5F + 0.1F * 4.0F) / 4.5F - dark, 1e-5F);
-  EXPECT_EQ(capture.sha256_of_input.count((dir_ / "frames/east-long.png").string()), 1U);
+  EXPECT_NEAR(dataset.stack[0].rgb[0].At(0, 0), (0.4F * 0.5F + 0.1F * 4.0F) / 4.5F - dark, 1e-5F);
+  EXPECT_EQ(dataset.sha256_of_input.count((dir_ / "frames/east-long.png").string()), 1U);
   WriteEast("east.png", 13107, 13107);
   EXPECT_NEAR(ValueOf(MustRead().stack[0]), 0.4F - dark, 1e-5F);  // the long one is saturated there
 }
@@ -200,8 +200,8 @@ TEST_F(Bracketed, GiveTheSameBitsOnAnyNumberOfThreads) {
   Write(session_);
   WriteEast("east.png", 13107, 1311);
   WriteEast("east-long.png", 65535, 10486);
-  const Capture one = *ReadCapture(dir_, {}, {.threads = 1});
-  const Capture three = *ReadCapture(dir_, {}, {.threads = 3});
+  const Dataset one = *ReadDataset(dir_, {}, {.threads = 1});
+  const Dataset three = *ReadDataset(dir_, {}, {.threads = 3});
   for (size_t k = 0; k < 4; ++k) {
     EXPECT_EQ(one.stack[k].rgb[1].pixels, three.stack[k].rgb[1].pixels);
   }
@@ -240,10 +240,10 @@ TEST_F(SessionLayout, LaysAFrameThatHasMovedOverTheFirst) {
   Image3 west(testing::kSize, 0.2F);
   west[0].At(2, 1) = 0.3F;
   ASSERT_TRUE(WriteExr(dir_ / "frames/west.exr", west));
-  const Capture capture = MustRead();
-  EXPECT_FLOAT_EQ(capture.stack[1].rgb[0].At(1, 1), 0.3F - 0.05F);
-  EXPECT_FLOAT_EQ(capture.stack[1].rgb[0].At(2, 1), 0.2F - 0.05F);
-  EXPECT_TRUE(std::isnan(capture.stack[1].rgb[0].At(3, 1)));
+  const Dataset dataset = MustRead();
+  EXPECT_FLOAT_EQ(dataset.stack[1].rgb[0].At(1, 1), 0.3F - 0.05F);
+  EXPECT_FLOAT_EQ(dataset.stack[1].rgb[0].At(2, 1), 0.2F - 0.05F);
+  EXPECT_TRUE(std::isnan(dataset.stack[1].rgb[0].At(3, 1)));
 }
 
 TEST_F(SessionLayout, TakesTheTruthOfAnotherSession) {
@@ -253,9 +253,9 @@ TEST_F(SessionLayout, TakesTheTruthOfAnotherSession) {
   EXPECT_THAT(FailureOf(dir_, {.truth_dir = other}),
               IsError(ErrorCode::kIo, "has no truth/normal.exr"));
   ASSERT_TRUE(WriteExr(other / "truth/normal.exr", testing::LevelNormals()));
-  const Capture capture = MustRead({.truth_dir = other});
-  ASSERT_TRUE(capture.truth);
-  EXPECT_EQ(capture.truth->source, (other / "truth/normal.exr").string());
+  const Dataset dataset = MustRead({.truth_dir = other});
+  ASSERT_TRUE(dataset.truth);
+  EXPECT_EQ(dataset.truth->source, (other / "truth/normal.exr").string());
 }
 
 TEST_F(SessionLayout, RefusesALightThatTheRigHasNot) {
@@ -273,9 +273,9 @@ TEST_F(SessionLayout, MatchesAnotherRigByTheNamesOfItsLights) {
   std::reverse(rig.lights.begin(), rig.lights.end());
   WriteText(temp_.Path() / "new.json", RigToJson(rig));
   fs::remove(temp_.Path() / "rig.json");  // not needed then
-  const Capture capture = MustRead({.rig_file = temp_.Path() / "new.json"});
-  EXPECT_EQ(capture.rig.lights[0].name, "south");
-  EXPECT_FLOAT_EQ(ValueOf(capture.stack[0]), 0.4F - 0.05F);
+  const Dataset dataset = MustRead({.rig_file = temp_.Path() / "new.json"});
+  EXPECT_EQ(dataset.rig.lights[0].name, "south");
+  EXPECT_FLOAT_EQ(ValueOf(dataset.stack[0]), 0.4F - 0.05F);
 }
 
 TEST_F(SessionLayout, WarnsOfARigThatIsNotTheSessions) {
@@ -320,12 +320,12 @@ TEST_F(SessionLayout, ReadsMaskAndTruth) {
   fs::create_directory(dir_ / "truth");
   ASSERT_TRUE(WriteExr(dir_ / "truth/normal.exr", testing::LevelNormals()));
   WriteFlat(dir_ / "truth/albedo.exr", 0.5F);
-  const Capture capture = MustRead();
-  EXPECT_TRUE(capture.mask);
-  ASSERT_TRUE(capture.truth);
-  ASSERT_TRUE(capture.truth->albedo);
-  EXPECT_EQ((*capture.truth->albedo)[2].At(0, 0), 0.5F);
-  EXPECT_THAT(capture.sha256_of_input, SizeIs(10));  // record, rig, 4 + 1 frames, mask, 2 truths
+  const Dataset dataset = MustRead();
+  EXPECT_TRUE(dataset.mask);
+  ASSERT_TRUE(dataset.truth);
+  ASSERT_TRUE(dataset.truth->albedo);
+  EXPECT_EQ((*dataset.truth->albedo)[2].At(0, 0), 0.5F);
+  EXPECT_THAT(dataset.sha256_of_input, SizeIs(10));  // record, rig, 4 + 1 frames, mask, 2 truths
 }
 
 TEST_F(SessionLayout, RefusesADarkFrameOfAnotherSize) {

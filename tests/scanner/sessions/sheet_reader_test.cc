@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 
 #include "simulation/rigs.h"
-#include "tests/scanner/sessions/captures.h"
+#include "tests/scanner/sessions/dataset_files.h"
 
 namespace sateen::sheet_reader_test {
 namespace {

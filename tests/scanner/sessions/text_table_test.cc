@@ -3,7 +3,7 @@
 #include <map>
 
 #include "core/sha256.h"
-#include "tests/scanner/sessions/captures.h"
+#include "tests/scanner/sessions/dataset_files.h"
 
 namespace sateen::text_table_test {
 namespace {

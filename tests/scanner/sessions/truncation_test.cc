@@ -1,6 +1,6 @@
-// Whatever part of a text file is missing, the answer is an error or a capture that holds together.
+// Whatever part of a text file is missing, the answer is an error or a dataset that holds together.
 #include "core/file_io.h"
-#include "tests/scanner/sessions/captures.h"
+#include "tests/scanner/sessions/dataset_files.h"
 
 namespace sateen::truncation_test {
 namespace {
@@ -10,21 +10,21 @@ namespace fs = std::filesystem;
 using testing::TempFolder;
 using testing::WriteText;
 
-void ExpectWhole(const Capture& capture) {
-  ASSERT_FALSE(capture.stack.empty());
-  ASSERT_EQ(capture.stack.size(), capture.rig.lights.size());
-  for (const Light& light : capture.rig.lights) {
+void ExpectWhole(const Dataset& dataset) {
+  ASSERT_FALSE(dataset.stack.empty());
+  ASSERT_EQ(dataset.stack.size(), dataset.rig.lights.size());
+  for (const Light& light : dataset.rig.lights) {
     EXPECT_TRUE(light.Validate("light"));
   }
 }
 
-// Reads `capture` with `text_file` cut at every byte, and with every byte replaced in turn.
-void Spoil(const fs::path& capture, const fs::path& text_file) {
+// Reads `dataset` with `text_file` cut at every byte, and with every byte replaced in turn.
+void Spoil(const fs::path& dataset, const fs::path& text_file) {
   const std::string text = ReadFileBytes(text_file).value();
   int errors = 0;
   const auto read = [&](const std::string& spoiled) {
     WriteText(text_file, spoiled);
-    const Result<Capture> result = ReadCapture(capture, {}, {.threads = 1});
+    const Result<Dataset> result = ReadDataset(dataset, {}, {.threads = 1});
     if (result) {
       ExpectWhole(*result);
     } else {
@@ -44,7 +44,7 @@ void Spoil(const fs::path& capture, const fs::path& text_file) {
   }
   EXPECT_GT(errors, 0);
   WriteText(text_file, text);
-  const Result<Capture> whole = ReadCapture(capture, {});
+  const Result<Dataset> whole = ReadDataset(dataset, {});
   EXPECT_TRUE(whole) << whole.error().message;
 }
 

@@ -4,7 +4,7 @@
 
 #include <limits>
 
-#include "tests/scanner/sessions/captures.h"
+#include "tests/scanner/sessions/dataset_files.h"
 
 namespace sateen::truth_test {
 namespace {

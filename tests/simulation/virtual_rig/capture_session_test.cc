@@ -6,8 +6,8 @@
 #include <set>
 
 #include "core/file_io.h"
-#include "scanner/sessions/stack_reader.h"
-#include "tests/scanner/sessions/captures.h"
+#include "scanner/sessions/dataset.h"
+#include "tests/scanner/sessions/dataset_files.h"
 #include "tests/simulation/virtual_rig/capture_fakes.h"
 
 // A capture on the real firmware in simulated time.
@@ -72,14 +72,14 @@ TEST_F(CaptureTest, TakesEveryFrameOfThePlanByItsOwnLight) {
   EXPECT_EQ(*VerifySession(dir_, {}), 14);  // 13 frames and the rig
   EXPECT_FALSE(fs::exists(dir_ / kIncoming));
   // What solves read: each frame is what its light gives, to the noise of a site.
-  const Capture capture = MustRead(dir_);
-  ASSERT_THAT(capture.stack, SizeIs(10));
+  const Dataset dataset = MustRead(dir_);
+  ASSERT_THAT(dataset.stack, SizeIs(10));
   const std::vector<Image3> images = LightImages(rig_);
   for (size_t k = 0; k < 10; ++k) {
     double seen = 0.0;
     double given = 0.0;
     for (size_t p = 0; p < kCapturePx.PixelCount(); ++p) {
-      seen += double{capture.stack[k].rgb[1].pixels[p]};
+      seen += double{dataset.stack[k].rgb[1].pixels[p]};
       given += double{images[k][1].pixels[p]};
     }
     const double exposure = summary->session.frames[k + 1].Exposure();

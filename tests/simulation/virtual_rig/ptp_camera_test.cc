@@ -11,7 +11,7 @@
 #include "imaging/dng.h"
 #include "imaging/raw.h"
 #include "simulation/virtual_rig/ptp_responder.h"
-#include "tests/scanner/sessions/captures.h"
+#include "tests/scanner/sessions/dataset_files.h"
 #include "tests/testing/files.h"
 
 // PtpCamera with libgphoto2 as it is, and a camera on the loopback interface. Deadlines are long where

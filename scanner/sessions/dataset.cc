@@ -1,4 +1,4 @@
-#include "scanner/sessions/stack_reader.h"
+#include "scanner/sessions/dataset.h"
 
 #include <algorithm>
 #include <set>
@@ -32,13 +32,13 @@ Status CheckKind(const fs::path& path) {
   return {};
 }
 
-Result<CapturePlan> PlanByPath(const fs::path& path, const ReadCaptureOptions& options) {
+Result<ReadPlan> PlanByPath(const fs::path& path, const ReadDatasetOptions& options) {
   if (const Status status = CheckKind(path); !status) {
     return tl::unexpected(status.error());
   }
   const bool find_mask = !options.mask_file.has_value();
   const auto with_companions = [&](const fs::path& dir, const fs::path& shared_dir) {
-    return [=](CapturePlan plan) -> Result<CapturePlan> {
+    return [=](ReadPlan plan) -> Result<ReadPlan> {
       return FindCompanions(dir, shared_dir, find_mask, plan).map([&] { return std::move(plan); });
     };
   };
@@ -72,7 +72,7 @@ Result<CapturePlan> PlanByPath(const fs::path& path, const ReadCaptureOptions& o
 }
 
 // The rig that the caller gives instead of the lights of a public layout.
-Status ReplaceRig(const fs::path& rig_file, CapturePlan& plan) {
+Status ReplaceRig(const fs::path& rig_file, ReadPlan& plan) {
   Result<Rig> rig = ReadRig(rig_file);
   if (!rig) {
     return tl::unexpected(rig.error());
@@ -99,8 +99,8 @@ Status ReplaceRig(const fs::path& rig_file, CapturePlan& plan) {
   return {};
 }
 
-Result<CapturePlan> Plan(const fs::path& path, const ReadCaptureOptions& options) {
-  Result<CapturePlan> plan = PlanByPath(path, options);
+Result<ReadPlan> Plan(const fs::path& path, const ReadDatasetOptions& options) {
+  Result<ReadPlan> plan = PlanByPath(path, options);
   if (!plan) {
     return plan;
   }
@@ -124,7 +124,7 @@ Result<CapturePlan> Plan(const fs::path& path, const ReadCaptureOptions& options
 }
 
 // Keeps the lights that are asked for, in the order asked.
-Status SelectLights(const std::vector<int>& wanted, CapturePlan& plan) {
+Status SelectLights(const std::vector<int>& wanted, ReadPlan& plan) {
   if (wanted.empty()) {
     return {};
   }
@@ -150,7 +150,7 @@ Status SelectLights(const std::vector<int>& wanted, CapturePlan& plan) {
 }
 
 // Every light has a frame, and no file serves two of them.
-Status CheckLitFrames(const fs::path& path, const CapturePlan& plan) {
+Status CheckLitFrames(const fs::path& path, const ReadPlan& plan) {
   std::set<fs::path> seen;
   for (size_t k = 0; k < plan.lit.size(); ++k) {
     if (plan.lit[k].empty()) {
@@ -172,15 +172,15 @@ Status CheckLitFrames(const fs::path& path, const CapturePlan& plan) {
   return {};
 }
 
-Status ReadMaskInto(const CapturePlan& plan, Capture& capture) {
+Status ReadMaskInto(const ReadPlan& plan, Dataset& dataset) {
   const std::string name = plan.mask->string();
   Result<Mask> mask = ReadMask(*plan.mask);
   if (!mask) {
     return tl::unexpected(mask.error());
   }
-  if (Status status = CheckSize(name, mask->Size(), capture.Size()); !status) {
+  if (Status status = CheckSize(name, mask->Size(), dataset.Size()); !status) {
     if (plan.mask_is_shared) {
-      capture.warnings.push_back("the mask was left out: " + status.error().message);
+      dataset.warnings.push_back("the mask was left out: " + status.error().message);
       return {};
     }
     return status;
@@ -193,51 +193,51 @@ Status ReadMaskInto(const CapturePlan& plan, Capture& capture) {
   if (!hash) {
     return tl::unexpected(hash.error());
   }
-  capture.sha256_of_input[name] = *hash;
-  capture.mask = *std::move(mask);
+  dataset.sha256_of_input[name] = *hash;
+  dataset.mask = *std::move(mask);
   return {};
 }
 
-void WarnOfSrgb(int srgb_count, Capture& capture) {
+void WarnOfSrgb(int srgb_count, Dataset& dataset) {
   if (srgb_count > 0) {
-    capture.warnings.push_back(fmt::format(
+    dataset.warnings.push_back(fmt::format(
         "{} of {} frames are sRGB files and were linearised: precision of 8 bits, where a camera "
         "may have changed tone and colour; use RAW or linear files to measure",
-        srgb_count, capture.stack.size()));
+        srgb_count, dataset.stack.size()));
   }
 }
 
-Status CheckCamera(const Capture& capture) {
-  const ImageSize size = capture.Size();
-  if (capture.rig.camera && capture.rig.camera->size_px != size) {
-    const ImageSize camera = capture.rig.camera->size_px;
+Status CheckCamera(const Dataset& dataset) {
+  const ImageSize size = dataset.Size();
+  if (dataset.rig.camera && dataset.rig.camera->size_px != size) {
+    const ImageSize camera = dataset.rig.camera->size_px;
     return Fail(ErrorCode::kBadData,
                 "{}: is {} x {} px but the rig's camera has {} x {} px; need the camera's size",
-                capture.FirstName(), size.width, size.height, camera.width, camera.height);
+                dataset.FirstName(), size.width, size.height, camera.width, camera.height);
   }
   return {};
 }
 
 // Mask and truth, which must fit the frames.
-Status AddCompanions(const CapturePlan& plan, Capture& capture) {
+Status AddCompanions(const ReadPlan& plan, Dataset& dataset) {
   if (plan.mask) {
-    if (Status status = ReadMaskInto(plan, capture); !status) {
+    if (Status status = ReadMaskInto(plan, dataset); !status) {
       return status;
     }
   }
   if (plan.truth) {
-    Result<Truth> truth = ReadTruth(*plan.truth, capture.Size(), capture.sha256_of_input);
+    Result<Truth> truth = ReadTruth(*plan.truth, dataset.Size(), dataset.sha256_of_input);
     if (!truth) {
       return tl::unexpected(truth.error());
     }
-    capture.truth = *std::move(truth);
+    dataset.truth = *std::move(truth);
   }
   return {};
 }
 
 // As colours or as mosaics.
-Status ReadFrames(const CapturePlan& plan, const ReadCaptureOptions& options, const Task& task,
-                  Capture& capture) {
+Status ReadFrames(const ReadPlan& plan, const ReadDatasetOptions& options, const Task& task,
+                  Dataset& dataset) {
   const std::optional<std::string> why_not = WhyNoMosaics(plan);
   if (options.domain != Domain::kRgb && !why_not) {
     Result<std::optional<SensorNoise>> noise;
@@ -246,13 +246,13 @@ Status ReadFrames(const CapturePlan& plan, const ReadCaptureOptions& options, co
     }
     if (!noise) {
       // No frame that is solved depends on it.
-      capture.warnings.push_back("the noise is not measured on the repeat: " +
+      dataset.warnings.push_back("the noise is not measured on the repeat: " +
                                  noise.error().message);
       noise = std::nullopt;
     }
     return LoadMosaics(plan, *noise, options.scratch_dir, task).map([&](LoadedMosaics mosaics) {
-      capture.sha256_of_input = mosaics.sha256_of_input;
-      capture.mosaics = std::move(mosaics);
+      dataset.sha256_of_input = mosaics.sha256_of_input;
+      dataset.mosaics = std::move(mosaics);
     });
   }
   if (options.domain == Domain::kRaw) {
@@ -260,20 +260,20 @@ Status ReadFrames(const CapturePlan& plan, const ReadCaptureOptions& options, co
                 plan.lit[0][0].path.string(), *why_not);
   }
   if (options.domain == Domain::kAuto) {
-    capture.why_no_mosaics = *why_not;
+    dataset.why_no_mosaics = *why_not;
   }
   return LoadFrames(plan.lit, plan.dark, options.encoding, task).map([&](LoadedFrames frames) {
-    capture.stack = std::move(frames.stack);
-    capture.sha256_of_input = std::move(frames.sha256_of_input);
-    WarnOfSrgb(frames.srgb_count, capture);
+    dataset.stack = std::move(frames.stack);
+    dataset.sha256_of_input = std::move(frames.sha256_of_input);
+    WarnOfSrgb(frames.srgb_count, dataset);
   });
 }
 
 }  // namespace
 
-Result<Capture> ReadCapture(const fs::path& path, const ReadCaptureOptions& options,
+Result<Dataset> ReadDataset(const fs::path& path, const ReadDatasetOptions& options,
                             const Task& task) {
-  Result<CapturePlan> plan = Plan(path, options);
+  Result<ReadPlan> plan = Plan(path, options);
   if (!plan) {
     return tl::unexpected(plan.error());
   }
@@ -283,22 +283,22 @@ Result<Capture> ReadCapture(const fs::path& path, const ReadCaptureOptions& opti
   if (const Status status = CheckLitFrames(path, *plan); !status) {
     return tl::unexpected(status.error());
   }
-  Capture capture;
-  if (const Status status = ReadFrames(*plan, options, task, capture); !status) {
+  Dataset dataset;
+  if (const Status status = ReadFrames(*plan, options, task, dataset); !status) {
     return tl::unexpected(status.error());
   }
-  capture.layout = plan->layout;
-  capture.rig = std::move(plan->rig);
-  capture.session = std::move(plan->session);
-  capture.warnings.insert(capture.warnings.begin(), plan->warnings.begin(), plan->warnings.end());
-  capture.sha256_of_input.merge(plan->sha256_of_input);
-  if (const Status status = CheckCamera(capture); !status) {
+  dataset.layout = plan->layout;
+  dataset.rig = std::move(plan->rig);
+  dataset.session = std::move(plan->session);
+  dataset.warnings.insert(dataset.warnings.begin(), plan->warnings.begin(), plan->warnings.end());
+  dataset.sha256_of_input.merge(plan->sha256_of_input);
+  if (const Status status = CheckCamera(dataset); !status) {
     return tl::unexpected(status.error());
   }
-  if (const Status status = AddCompanions(*plan, capture); !status) {
+  if (const Status status = AddCompanions(*plan, dataset); !status) {
     return tl::unexpected(status.error());
   }
-  return capture;
+  return dataset;
 }
 
 }  // namespace sateen

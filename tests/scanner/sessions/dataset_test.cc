@@ -1,11 +1,11 @@
-#include "scanner/sessions/stack_reader.h"
+#include "scanner/sessions/dataset.h"
 
 #include <atomic>
 
 #include "core/sha256.h"
-#include "tests/scanner/sessions/captures.h"
+#include "tests/scanner/sessions/dataset_files.h"
 
-namespace sateen::stack_reader_test {
+namespace sateen::dataset_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -28,7 +28,7 @@ class StackReader : public ::testing::Test {
     testing::WriteMask(dir_ / "mask.png");
     EXPECT_TRUE(WriteExr(dir_ / "normal_gt.exr", testing::LevelNormals()));
   }
-  Capture MustRead(const ReadCaptureOptions& options = {}, const Task& task = {}) {
+  Dataset MustRead(const ReadDatasetOptions& options = {}, const Task& task = {}) {
     return testing::MustRead(dir_, options, task);
   }
 
@@ -37,9 +37,9 @@ class StackReader : public ::testing::Test {
 };
 
 TEST_F(StackReader, HashesEveryFileThatItReads) {
-  const Capture capture = MustRead();
+  const Dataset dataset = MustRead();
   std::vector<std::string> names;
-  for (const auto& [path, hash] : capture.sha256_of_input) {
+  for (const auto& [path, hash] : dataset.sha256_of_input) {
     names.push_back(fs::path(path).filename().string());
     EXPECT_EQ(hash, Sha256OfFile(path).value()) << path;
   }
@@ -48,12 +48,12 @@ TEST_F(StackReader, HashesEveryFileThatItReads) {
 }
 
 TEST_F(StackReader, TakesTheLightsAskedForInTheOrderAsked) {
-  const Capture capture = MustRead({.lights = {3, 1}});
-  ASSERT_THAT(capture.stack, SizeIs(2));
-  EXPECT_FLOAT_EQ(capture.stack[0].rgb[0].At(0, 0), 0.4F);
-  EXPECT_FLOAT_EQ(capture.stack[1].rgb[0].At(0, 0), 0.2F);
-  ASSERT_THAT(capture.rig.lights, SizeIs(2));
-  EXPECT_EQ(capture.rig.lights[0].name, "light-3");
+  const Dataset dataset = MustRead({.lights = {3, 1}});
+  ASSERT_THAT(dataset.stack, SizeIs(2));
+  EXPECT_FLOAT_EQ(dataset.stack[0].rgb[0].At(0, 0), 0.4F);
+  EXPECT_FLOAT_EQ(dataset.stack[1].rgb[0].At(0, 0), 0.2F);
+  ASSERT_THAT(dataset.rig.lights, SizeIs(2));
+  EXPECT_EQ(dataset.rig.lights[0].name, "light-3");
 }
 
 TEST_F(StackReader, DoesNotReadFramesOfOtherLights) {
@@ -93,10 +93,10 @@ TEST_F(StackReader, RefusesAMaskThatDoesNotFitOrIsEmpty) {
 TEST_F(StackReader, TakesTheMaskThatTheCallerNames) {
   testing::WriteMask(dir_ / "mask.png", {5, 3});  // not even looked at then
   testing::WriteMask(temp_.Path() / "other.png");
-  const Capture capture = MustRead({.mask_file = temp_.Path() / "other.png"});
-  ASSERT_TRUE(capture.mask);
-  EXPECT_NE(capture.mask->At(0, 0), 0);
-  EXPECT_EQ(capture.mask->At(1, 0), 0);
+  const Dataset dataset = MustRead({.mask_file = temp_.Path() / "other.png"});
+  ASSERT_TRUE(dataset.mask);
+  EXPECT_NE(dataset.mask->At(0, 0), 0);
+  EXPECT_EQ(dataset.mask->At(1, 0), 0);
   EXPECT_THAT(FailureOf(dir_, {.mask_file = temp_.Path() / "gone.png"}),
               IsError(ErrorCode::kIo, "gone.png"));
 }
@@ -104,10 +104,10 @@ TEST_F(StackReader, TakesTheMaskThatTheCallerNames) {
 TEST_F(StackReader, TakesTheRigThatTheCallerNames) {
   Rig rig = testing::FourLights();
   WriteText(temp_.Path() / "rig.json", RigToJson(rig));
-  const Capture capture = MustRead({.lights = {2}, .rig_file = temp_.Path() / "rig.json"});
-  ASSERT_THAT(capture.rig.lights, SizeIs(1));
-  EXPECT_EQ(capture.rig.lights[0].name, "north");
-  EXPECT_TRUE(capture.sha256_of_input.contains((temp_.Path() / "rig.json").string()));
+  const Dataset dataset = MustRead({.lights = {2}, .rig_file = temp_.Path() / "rig.json"});
+  ASSERT_THAT(dataset.rig.lights, SizeIs(1));
+  EXPECT_EQ(dataset.rig.lights[0].name, "north");
+  EXPECT_TRUE(dataset.sha256_of_input.contains((temp_.Path() / "rig.json").string()));
 
   rig.lights.pop_back();
   WriteText(temp_.Path() / "rig.json", RigToJson(rig));
@@ -126,12 +126,12 @@ TEST_F(StackReader, WarnsOnceOfFramesThatWereSrgb) {
     const Image<uint8_t> plane(testing::kSize, 128);
     ASSERT_TRUE(WritePng8(dir_ / fmt::format("im.{}.png", k), {plane, plane, plane}));
   }
-  const Capture srgb = MustRead();
+  const Dataset srgb = MustRead();
   ASSERT_THAT(srgb.warnings, SizeIs(1));
   EXPECT_THAT(srgb.warnings[0], HasSubstr("4 of 4 frames are sRGB files and were linearised"));
   EXPECT_NEAR(srgb.stack[0].rgb[0].At(0, 0), 0.21586F, 1e-5F);  // of 128 / 255, IEC 61966-2-1
 
-  const Capture linear = MustRead({.encoding = Encoding::kLinear});
+  const Dataset linear = MustRead({.encoding = Encoding::kLinear});
   EXPECT_THAT(linear.warnings, IsEmpty());
   EXPECT_FLOAT_EQ(linear.stack[0].rgb[0].At(0, 0), 128.0F / 255.0F);
 }
@@ -139,14 +139,14 @@ TEST_F(StackReader, WarnsOnceOfFramesThatWereSrgb) {
 TEST_F(StackReader, IntegerFilesSaturateAndFloatFilesDoNot) {
   fs::remove(dir_ / "im.8.exr");
   testing::WriteFlatPng16(dir_ / "im.8.png", 6554);
-  const Capture capture = MustRead();
-  EXPECT_FLOAT_EQ(capture.stack[0].full_scale, 1.0F);
-  EXPECT_TRUE(std::isinf(capture.stack[1].full_scale));
+  const Dataset dataset = MustRead();
+  EXPECT_FLOAT_EQ(dataset.stack[0].full_scale, 1.0F);
+  EXPECT_TRUE(std::isinf(dataset.stack[1].full_scale));
 }
 
 TEST_F(StackReader, GivesTheSameBitsOnAnyNumberOfThreads) {
-  const Capture one = MustRead({}, {.threads = 1});
-  const Capture five = MustRead({}, {.threads = 5});
+  const Dataset one = MustRead({}, {.threads = 1});
+  const Dataset five = MustRead({}, {.threads = 5});
   ASSERT_EQ(one.stack.size(), five.stack.size());
   for (size_t k = 0; k < one.stack.size(); ++k) {
     EXPECT_EQ(one.stack[k].name, five.stack[k].name);
@@ -172,7 +172,7 @@ TEST_F(StackReader, TellsItsProgressToTheEnd) {
   testing::WriteSession(temp_.Path() / "session", testing::FourLightSession());
   for (const char* name : {"cat", "session"}) {
     CountingProgress progress;
-    ASSERT_TRUE(ReadCapture(temp_.Path() / name, {}, {.progress = &progress}));
+    ASSERT_TRUE(ReadDataset(temp_.Path() / name, {}, {.progress = &progress}));
     EXPECT_EQ(progress.stage, "reading");
     EXPECT_EQ(progress.left, 0);
   }
@@ -180,9 +180,9 @@ TEST_F(StackReader, TellsItsProgressToTheEnd) {
 
 TEST_F(StackReader, StopsWhenCancelled) {
   const std::atomic<bool> cancel = true;
-  const Result<Capture> capture = ReadCapture(dir_, {}, {.cancel = &cancel});
-  ASSERT_FALSE(capture);
-  EXPECT_EQ(capture.error().code, ErrorCode::kCancelled);
+  const Result<Dataset> dataset = ReadDataset(dir_, {}, {.cancel = &cancel});
+  ASSERT_FALSE(dataset);
+  EXPECT_EQ(dataset.error().code, ErrorCode::kCancelled);
 }
 
 TEST_F(StackReader, SaysWhatItFoundWhereThereIsNoCapture) {
@@ -205,4 +205,4 @@ TEST_F(StackReader, ASessionCountsBeforeOtherLayouts) {
 }
 
 }  // namespace
-}  // namespace sateen::stack_reader_test
+}  // namespace sateen::dataset_test

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "imaging/image_io.h"
-#include "scanner/sessions/stack_reader.h"
+#include "scanner/sessions/dataset.h"
 #include "tests/testing/files.h"
 
 namespace sateen::testing {
@@ -115,21 +115,21 @@ inline void WriteSession(const std::filesystem::path& dir, const Session& sessio
   WriteFlat(dir / "frames" / "dark.exr", 0.05F);
 }
 
-// The capture; ends the test with the message where it cannot be read.
-inline Capture MustRead(const std::filesystem::path& path, const ReadCaptureOptions& options = {},
+// The dataset; ends the test with the message where it cannot be read.
+inline Dataset MustRead(const std::filesystem::path& path, const ReadDatasetOptions& options = {},
                         const Task& task = {}) {
-  Result<Capture> capture = ReadCapture(path, options, task);
-  if (!capture) {
-    throw std::runtime_error(capture.error().message);
+  Result<Dataset> dataset = ReadDataset(path, options, task);
+  if (!dataset) {
+    throw std::runtime_error(dataset.error().message);
   }
-  return *std::move(capture);
+  return *std::move(dataset);
 }
 
 // The error that reading gives; fails the test where it gives none.
-inline Error FailureOf(const std::filesystem::path& path, const ReadCaptureOptions& options = {}) {
-  const Result<Capture> capture = ReadCapture(path, options);
-  EXPECT_FALSE(capture) << path << " was read";
-  return capture ? Error{ErrorCode::kDevice, ""} : capture.error();
+inline Error FailureOf(const std::filesystem::path& path, const ReadDatasetOptions& options = {}) {
+  const Result<Dataset> dataset = ReadDataset(path, options);
+  EXPECT_FALSE(dataset) << path << " was read";
+  return dataset ? Error{ErrorCode::kDevice, ""} : dataset.error();
 }
 
 MATCHER_P2(IsError, code, part, "") {

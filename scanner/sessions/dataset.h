@@ -17,15 +17,16 @@
 
 namespace sateen {
 
-// What of a capture's frames is read: colours interpolated at every pixel, or readings of the mosaic.
+// How frames are read: colours interpolated at every pixel, or readings of the mosaic.
 enum class Domain {
   kRgb,  // LightStack
   kRaw,  // LoadedMosaics, or an error
-  kAuto  // LoadedMosaics where the capture allows it
+  kAuto  // LoadedMosaics where the frames allow it
 };
 
-// A capture of any layout, read into values: what the solver needs, and where it came from.
-struct Capture {
+// A session, or photographs in a public layout, read into values: what the solver needs, and where
+// it came from.
+struct Dataset {
   std::string layout;  // "session", "diligent", "lp", "lights.txt", "photographs"
   LightStack stack;    // K frames, all of one size; empty where there are mosaics
   std::optional<LoadedMosaics> mosaics;
@@ -45,14 +46,14 @@ struct Capture {
   }
 };
 
-struct ReadCaptureOptions {
-  // Use only these lights, in this order, by their index from 0 in the capture; empty: all.
+struct ReadDatasetOptions {
+  // Use only these lights, in this order, by their index from 0 in the dataset; empty: all.
   std::vector<int> lights = {};
-  // Use these instead of what the capture names. The rig has one light for each of the capture's,
+  // Use these instead of what the dataset names. The rig has one light for each of the dataset's,
   // in the same order; those of a session are matched by name.
   std::optional<std::filesystem::path> rig_file = std::nullopt;
   std::optional<std::filesystem::path> mask_file = std::nullopt;
-  // A simulated session whose truth is this capture's too, in place of what lies beside it.
+  // A simulated session whose truth is this dataset's too, in place of what lies beside it.
   std::optional<std::filesystem::path> truth_dir = std::nullopt;
   // Of a folder that is no session take all photographs, one for each light, whose directions are
   // not known yet (docs/calibration.md, Chrome spheres).
@@ -64,15 +65,16 @@ struct ReadCaptureOptions {
   std::filesystem::path scratch_dir = {};  // LoadMosaics()
 };
 
-/// Reads a capture as it is: a folder with session.json (docs/formats.md), a DiLiGenT folder, an
+/// Reads a dataset as it is: a folder with session.json (docs/formats.md), a DiLiGenT folder, an
 /// RTI .lp file, a folder of images with a lights.txt in it or one folder up, or, with a rig file, a
 /// folder of images alone. Where a folder could be several of these, the first counts.
 ///
 /// Errors   kInvalidArgument: a light that `options` asks for does not exist, or is asked for twice
 ///          kIo: a file is absent or unreadable
-///          kBadData: Domain::kRaw of a capture that has no mosaics; wrong counts, sizes or formats, a light of zero length, a hash that differs
+///          kBadData: Domain::kRaw of a dataset that has no mosaics; wrong counts, sizes or formats;
+///          a light of zero length; a hash that differs
 ///          kCancelled
-[[nodiscard]] Result<Capture> ReadCapture(const std::filesystem::path& path,
-                                          const ReadCaptureOptions& options, const Task& task = {});
+[[nodiscard]] Result<Dataset> ReadDataset(const std::filesystem::path& path,
+                                          const ReadDatasetOptions& options, const Task& task = {});
 
 }  // namespace sateen
