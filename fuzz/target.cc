@@ -41,6 +41,7 @@ const fs::path& Folder() {
 
 fs::path FileOf(std::string_view name, std::string_view bytes) {
   fs::path path = Folder() / name;
+  fs::create_directories(path.parent_path());
   std::ofstream file(path, std::ios::binary);
   file.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
   file.close();

@@ -144,9 +144,12 @@ Status ReadTexture(JsonReader reader, const Surface& surface, Albedo& albedo) {
     return ReadPrint(reader, surface, albedo);
   } else if (kind == "patches") {
     const int count = reader.Integer("count");
-    albedo =
-        PatchesAlbedo{.values = reader.Numbers("values", static_cast<size_t>(std::max(count, 0))),
-                      .patch_mm = reader.Number("patch_mm")};
+    // The list as it is: room for `count` numbers would be made before they are counted.
+    std::vector<double> values =
+        reader.OptionalNumberList("values").value_or(std::vector<double>());
+    reader.Require(std::cmp_equal(values.size(), count), "values",
+                   fmt::format("has {} numbers; need {}, as count says", values.size(), count));
+    albedo = PatchesAlbedo{.values = std::move(values), .patch_mm = reader.Number("patch_mm")};
   } else {
     reader.Require(false, "kind", fmt::format("'{}'; need waves, print or patches", kind));
   }
