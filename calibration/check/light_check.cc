@@ -7,7 +7,7 @@
 #include <limits>
 
 #include "calibration/check/change_choice.h"
-#include "calibration/lights/lit_from.h"
+#include "calibration/check/lit_from.h"
 #include "core/angle.h"
 
 namespace sateen {

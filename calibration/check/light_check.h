@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "calibration/check/check_system.h"
-#include "calibration/sheet/sheet_surface.h"
+#include "calibration/check/sheet_surface.h"
 #include "core/error.h"
 #include "core/task.h"
 #include "rig/rig.h"

@@ -6,9 +6,9 @@
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core.hpp>
 
-#include "calibration/lens/pose_solve.h"
 #include "calibration/lights/robust_fit.h"
 #include "calibration/print/plane_map.h"
+#include "calibration/print/pose_solve.h"
 #include "core/angle.h"
 
 namespace sateen {

@@ -2,8 +2,8 @@
 
 #include <Eigen/Geometry>
 
-#include "calibration/lens/pose_solve.h"
 #include "calibration/print/board_find.h"
+#include "calibration/print/pose_solve.h"
 #include "core/error.h"
 #include "rig/camera.h"
 

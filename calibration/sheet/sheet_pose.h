@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "calibration/lens/pose_solve.h"
+#include "calibration/print/pose_solve.h"
 #include "core/error.h"
 #include "imaging/image.h"
 #include "rig/camera.h"

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <map>
 
-#include "calibration/lens/pose_solve.h"
+#include "calibration/print/pose_solve.h"
 #include "core/output_folder.h"
 #include "imaging/image_io.h"
 #include "imaging/show/canvas.h"

@@ -1,4 +1,4 @@
-#include "calibration/sheet/sheet_surface.h"
+#include "calibration/check/sheet_surface.h"
 
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>

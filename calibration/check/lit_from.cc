@@ -1,4 +1,4 @@
-#include "calibration/lights/lit_from.h"
+#include "calibration/check/lit_from.h"
 
 #include <cmath>
 #include <limits>

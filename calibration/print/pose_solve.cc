@@ -1,4 +1,4 @@
-#include "calibration/lens/pose_solve.h"
+#include "calibration/print/pose_solve.h"
 
 #include <Eigen/Cholesky>
 #include <Eigen/SVD>
