@@ -5,7 +5,7 @@
 
 #include "calibration/check/check_system.h"
 #include "calibration/check/check_unknowns.h"
-#include "calibration/lights/robust_fit.h"
+#include "calibration/fit/robust_spread.h"
 
 namespace sateen {
 

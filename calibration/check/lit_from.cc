@@ -3,7 +3,7 @@
 #include <cmath>
 #include <limits>
 
-#include "calibration/lights/robust_fit.h"
+#include "calibration/fit/robust_spread.h"
 
 namespace sateen {
 namespace {

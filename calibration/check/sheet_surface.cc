@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "calibration/lights/robust_fit.h"
+#include "calibration/fit/robust_spread.h"
 #include "core/angle.h"
 
 namespace sateen {

@@ -6,7 +6,7 @@
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core.hpp>
 
-#include "calibration/lights/robust_fit.h"
+#include "calibration/fit/robust_spread.h"
 #include "calibration/print/plane_map.h"
 #include "calibration/print/pose_solve.h"
 #include "core/angle.h"

@@ -7,8 +7,8 @@
 #include <limits>
 #include <utility>
 
+#include "calibration/fit/robust_spread.h"
 #include "calibration/lights/light_residuals.h"
-#include "calibration/lights/robust_fit.h"
 
 namespace sateen {
 namespace {

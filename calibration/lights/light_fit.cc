@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "calibration/fit/robust_spread.h"
 #include "calibration/lights/field_fit.h"
 #include "calibration/lights/light_residuals.h"
 #include "calibration/lights/robust_fit.h"

@@ -26,16 +26,4 @@ struct RobustFit {
                                             const Light& start, const std::vector<size_t>& indices,
                                             bool with_covariance);
 
-// Those of the indices whose residuals, all three, are within 4 times `spread`.
-[[nodiscard]] std::vector<size_t> OnModel(const std::vector<size_t>& indices,
-                                          const std::vector<double>& residuals, double spread);
-
-// The standard deviation of residuals about zero, from the median of their sizes.
-[[nodiscard]] double SpreadOf(const std::vector<double>& residuals);
-
-[[nodiscard]] double Rms(const std::vector<double>& values);
-
-// The upper one of the two in the middle, if two are. `values` is not empty.
-[[nodiscard]] double Median(std::vector<double> values);
-
 }  // namespace sateen

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <optional>
 
-#include "calibration/lights/robust_fit.h"
+#include "calibration/fit/robust_spread.h"
 #include "imaging/color.h"
 
 namespace sateen {

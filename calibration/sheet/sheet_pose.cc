@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "calibration/lights/robust_fit.h"
+#include "calibration/fit/robust_spread.h"
 #include "calibration/print/border_view.h"
 #include "calibration/print/print_fit.h"
 #include "core/angle.h"

@@ -6,7 +6,7 @@
 #include <ostream>
 #include <utility>
 
-#include "calibration/lights/robust_fit.h"
+#include "calibration/fit/robust_spread.h"
 #include "cli/calibrate/calibrate_check_report.h"
 #include "core/output_folder.h"
 #include "imaging/image_io.h"
