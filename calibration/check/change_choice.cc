@@ -12,8 +12,7 @@ constexpr double kPerParameter = 15.0;  // of chi2, that an explanation must ear
 constexpr double kAlsoMoved = 0.3;      // of the largest gain
 
 // Frees the lights whose change earns most; false where none earns its parameters.
-bool AddChanges(const CheckSystem& system, const ChangeFit& fit, ChangeMask& mask) {
-  const std::vector<ChangeGain> gains = system.Gains(fit);
+bool AddChanges(const std::vector<ChangeGain>& gains, ChangeMask& mask) {
   const auto earned = [&](size_t k) {
     const double moved = mask.moved[k] ? 0.0 : gains[k].moved - 3.0 * kPerParameter;
     const double turned = mask.turned[k] ? 0.0 : gains[k].turned - 2.0 * kPerParameter;
@@ -37,8 +36,9 @@ bool AddChanges(const CheckSystem& system, const ChangeFit& fit, ChangeMask& mas
 
 }  // namespace
 
-Result<ChangeChoice> ChooseChange(const CheckSystem& system, size_t lights, size_t sheets,
+Result<ChangeChoice> ChooseChange(const CheckModel& model, const SampleWeights& weights,
                                   const Task& task) {
+  const size_t lights = model.LightCount();
   ChangeChoice best;
   double least = std::numeric_limits<double>::infinity();
   for (const auto& [camera, lie] :
@@ -47,14 +47,14 @@ Result<ChangeChoice> ChooseChange(const CheckSystem& system, size_t lights, size
                     .turned = std::vector<bool>(lights),
                     .camera = camera,
                     .sheets = lie};
-    ChangeFit fit = system.Fit(mask, system.Unchanged());
-    while (AddChanges(system, fit, mask)) {
-      fit = system.Fit(mask, fit.change);
+    ChangeFit fit = FitChange(model, weights, mask, model.Unchanged(), task);
+    while (AddChanges(GainsOf(model, weights, fit, task), mask)) {
+      fit = FitChange(model, weights, mask, fit.change, task);
       if (Status status = task.CheckCancelled(); !status) {
         return tl::unexpected(status.error());
       }
     }
-    const double cost = fit.chi2 + kPerParameter * mask.Parameters(sheets);
+    const double cost = fit.chi2 + kPerParameter * mask.Parameters(model.Sheets().size());
     if (cost < least) {
       least = cost;
       best = {std::move(mask), std::move(fit)};

@@ -1,6 +1,8 @@
 #pragma once
 
-#include "calibration/check/check_system.h"
+#include "calibration/check/check_fit.h"
+#include "calibration/check/check_model.h"
+#include "calibration/check/rig_change.h"
 #include "core/error.h"
 #include "core/task.h"
 
@@ -11,10 +13,17 @@ struct ChangeChoice {
   ChangeFit fit;
 };
 
-/// The change that explains the sheets best: of all combinations of a camera that moved and sheets
-/// that lie elsewhere, each with as many lights that moved or turned as earn it, the one with the
-/// least chi2 + 15 per parameter. Errors: kCancelled.
-[[nodiscard]] Result<ChangeChoice> ChooseChange(const CheckSystem& system, size_t lights,
-                                                size_t sheets, const Task& task);
+/// Chooses the change that explains the sheets best: the one with the least chi2 + 15 per free
+/// unknown among
+///
+///     nothing; the camera moved; the sheets lie elsewhere; both
+///
+/// each with as many lights moved or turned as earn their unknowns, added by their gain.
+///
+/// Errors   kCancelled
+///          kDegenerate: no explanation has a finite chi2
+/// Cost     four fits and one more per round of lights added
+[[nodiscard]] Result<ChangeChoice> ChooseChange(const CheckModel& model,
+                                                const SampleWeights& weights, const Task& task);
 
 }  // namespace sateen

@@ -1,175 +1,220 @@
+#include "calibration/check/check_fit.h"
+
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <type_traits>
 
-#include "calibration/check/check_system.h"
 #include "calibration/check/check_unknowns.h"
+#include "core/parallel.h"
 
 namespace sateen {
-
 namespace {
 
-constexpr int kFitSteps = 5;         // of Gauss and Newton at most
-constexpr double kSmallGain = 0.05;  // of chi2, below which no further step is made
+constexpr int kFitSteps = 5;
+constexpr double kSmallGain = 0.05;  // fall of chi2 below which no further step is made
 
-// Where each free unknown stands in the system of all.
-struct UnknownPlaces {
-  std::vector<std::array<int, kCameraAt>> light;  // -1: not free
-  std::array<int, 4> camera = {-1, -1, -1, -1};
-  std::vector<std::array<int, 6>> sheet;
-  int count = 0;
+using LocalNormals = std::vector<std::vector<LocalNormal>>;  // [light][sheet]
 
-  UnknownPlaces(const ChangeMask& mask, const std::vector<bool>& used, size_t sheets) {
-    light.resize(used.size());
-    for (size_t k = 0; k < used.size(); ++k) {
-      for (int i = 0; i < kCameraAt; ++i) {
-        const bool is_free =
-            used[k] && (i < kMovedAt || (i < kTurnedAt ? mask.moved[k] : mask.turned[k]));
-        light[k][static_cast<size_t>(i)] = is_free ? count++ : -1;
+bool TakesPart(const SampleWeights& weights, size_t light) { return !weights[light].empty(); }
+
+LocalNormals NormalsOf(const CheckModel& model, const SampleWeights& weights,
+                       const RigChange& change, const std::vector<WantedUnknowns>& wanted,
+                       const Task& task) {
+  LocalNormals normals(weights.size());
+  (void)ParallelFor(
+      static_cast<int>(weights.size()), 1, Task{.threads = task.threads}, [&](int begin, int end) {
+        for (auto k = static_cast<size_t>(begin); k < static_cast<size_t>(end); ++k) {
+          for (size_t s = 0; s < weights[k].size(); ++s) {
+            normals[k].push_back(model.NormalOf(s, k, change, weights[k][s], wanted[k]));
+          }
+        }
+      });
+  return normals;
+}
+
+// Places of the free unknowns in the system of all; -1: not free.
+class UnknownPlaces {
+ public:
+  UnknownPlaces(const ChangeMask& mask, const SampleWeights& weights, size_t sheets)
+      : light_(weights.size()), sheet_(sheets) {
+    for (size_t k = 0; k < light_.size(); ++k) {
+      for (int i = 0; i < kOfLight; ++i) {
+        const bool is_free = TakesPart(weights, k) &&
+                             (i < kMovedAt || (i < kTurnedAt ? mask.moved[k] : mask.turned[k]));
+        light_[k][static_cast<size_t>(i)] = is_free ? count_++ : -1;
       }
     }
-    for (int& place : camera) {
-      place = mask.camera ? count++ : -1;
+    for (int& place : camera_) {
+      place = mask.camera ? count_++ : -1;
     }
-    sheet.resize(sheets);
-    for (std::array<int, 6>& places : sheet) {
+    for (std::array<int, kLocal - kSheetAt>& places : sheet_) {
       for (int& place : places) {
-        place = mask.sheets ? count++ : -1;
+        place = mask.sheets ? count_++ : -1;
       }
     }
   }
-  [[nodiscard]] int Of(size_t in_sheet, size_t in_light, int local) const {
+
+  [[nodiscard]] int Count() const { return count_; }
+
+  [[nodiscard]] int Of(size_t sheet, size_t light, int local) const {
     const auto i = static_cast<size_t>(local);
     if (local < kCameraAt) {
-      return light[in_light][i];
+      return light_[light][i];
     }
-    return local < kSheetAt ? camera[i - kCameraAt] : sheet[in_sheet][i - kSheetAt];
+    return local < kSheetAt ? camera_[i - kCameraAt] : sheet_[sheet][i - kSheetAt];
+  }
+
+  // Calls `visit` with sheet, light and local number of each free unknown, in the order of places.
+  template <typename Visit>
+  void ForEach(const Visit& visit) const {
+    for (size_t k = 0; k < light_.size(); ++k) {
+      VisitRange(0, k, 0, kOfLight, visit);
+    }
+    VisitRange(0, 0, kCameraAt, kSheetAt, visit);
+    for (size_t s = 0; s < sheet_.size(); ++s) {
+      VisitRange(s, 0, kSheetAt, kLocal, visit);
+    }
+  }
+
+ private:
+  template <typename Visit>
+  void VisitRange(size_t sheet, size_t light, int from, int to, const Visit& visit) const {
+    for (int local = from; local < to; ++local) {
+      if (const int place = Of(sheet, light, local); place >= 0) {
+        visit(place, sheet, light, local);
+      }
+    }
+  }
+
+  std::vector<std::array<int, kOfLight>> light_;
+  std::array<int, kSheetAt - kCameraAt> camera_ = {};
+  std::vector<std::array<int, kLocal - kSheetAt>> sheet_;
+  int count_ = 0;
+};
+
+// Normal equations of (1).
+struct ChangeNormal {
+  Eigen::MatrixXd matrix;
+  Eigen::VectorXd gradient;
+  double chi2 = 0.0;
+
+  ChangeNormal(const UnknownPlaces& places, const LocalNormals& normals, const RigChange& change)
+      : matrix(Eigen::MatrixXd::Zero(places.Count(), places.Count())),
+        gradient(Eigen::VectorXd::Zero(places.Count())) {
+    for (size_t k = 0; k < normals.size(); ++k) {
+      for (size_t s = 0; s < normals[k].size(); ++s) {
+        Add(places, s, k, normals[k][s]);
+      }
+    }
+    places.ForEach([&](int place, size_t s, size_t k, int local) {
+      const PriorTerm prior = PriorOfUnknown(local, UnknownAt(change, s, k, local));
+      matrix(place, place) += prior.precision;
+      gradient[place] += prior.gradient;
+      chi2 += prior.chi2;
+    });
+  }
+
+ private:
+  void Add(const UnknownPlaces& places, size_t sheet, size_t light, const LocalNormal& normal) {
+    chi2 += normal.chi2;
+    for (int i = 0; i < kLocal; ++i) {
+      const int row = places.Of(sheet, light, i);
+      if (row < 0) {
+        continue;
+      }
+      gradient[row] += normal.gradient[i];
+      for (int j = 0; j < kLocal; ++j) {
+        if (const int column = places.Of(sheet, light, j); column >= 0) {
+          matrix(row, column) += normal.matrix(i, j);
+        }
+      }
+    }
   }
 };
 
+// Returns the covariance of `Size` unknowns from a place on; zero where they are not free.
 template <int Size>
 Eigen::Matrix<double, Size, Size> CovarianceBlock(const Eigen::MatrixXd& covariance, int place) {
   return place < 0 ? Eigen::Matrix<double, Size, Size>::Zero().eval()
                    : covariance.block<Size, Size>(place, place).eval();
 }
 
-}  // namespace
+// Step of some unknowns of one light, its flux following.
+template <int Size>
+struct FollowedStep {
+  Eigen::Matrix<double, Size, Size> covariance;
+  double gain = 0.0;  // fall of chi2
+};
 
-int ChangeMask::Parameters(size_t sheet_count) const {
-  return static_cast<int>(3 * std::ranges::count(moved, true) +
-                          2 * std::ranges::count(turned, true)) +
-         (camera ? 4 : 0) + (sheets ? 6 * static_cast<int>(sheet_count) : 0);
+// Eliminates the flux from the unknowns [At, At + Size).
+template <int At, int Size>
+FollowedStep<Size> StepWithFlux(const LocalNormal& light) {
+  const Eigen::Matrix3d flux = light.matrix.block<3, 3>(kFluxAt, kFluxAt).inverse();
+  const Eigen::Matrix<double, 3, Size> with_flux = light.matrix.block<3, Size>(kFluxAt, At);
+  const Eigen::Matrix<double, Size, Size> left =
+      light.matrix.block<Size, Size>(At, At) - with_flux.transpose() * flux * with_flux;
+  const Eigen::Matrix<double, Size, 1> gradient =
+      light.gradient.segment<Size>(At) - with_flux.transpose() * flux * light.gradient.head<3>();
+  const Eigen::Matrix<double, Size, Size> covariance = left.inverse();
+  return {covariance, gradient.dot(covariance * gradient)};
 }
 
-ChangeFit CheckSystem::Fit(const ChangeMask& mask, const RigChange& start) const {
-  const UnknownPlaces places(mask, used_, sheets_.size());
-  std::vector<Wanted> wanted;
-  for (size_t k = 0; k < used_.size(); ++k) {
-    wanted.push_back(WantedOf(k, mask.moved[k], mask.turned[k], mask.camera, mask.sheets));
+}  // namespace
+
+ChangeFit FitChange(const CheckModel& model, const SampleWeights& weights, const ChangeMask& mask,
+                    const RigChange& start, const Task& task) {
+  const UnknownPlaces places(mask, weights, model.Sheets().size());
+  std::vector<WantedUnknowns> wanted;
+  for (size_t k = 0; k < weights.size(); ++k) {
+    wanted.push_back(model.WantedOf(k, mask.moved[k], mask.turned[k], mask.camera, mask.sheets));
   }
   ChangeFit fit{.change = start};
   Eigen::MatrixXd covariance;
   for (int step = 0;; ++step) {
-    Eigen::MatrixXd matrix = Eigen::MatrixXd::Zero(places.count, places.count);
-    Eigen::VectorXd gradient = Eigen::VectorXd::Zero(places.count);
-    std::vector<double*> unknowns(static_cast<size_t>(places.count), nullptr);
-    std::vector<double> priors(unknowns.size(), 1.0);
-    fit.chi2 = 0.0;
-    const std::vector<std::vector<Normal>> normals = Normals(fit.change, wanted);
-    for (size_t k = 0; k < normals.size(); ++k) {
-      for (size_t s = 0; s < normals[k].size(); ++s) {
-        const Normal& normal = normals[k][s];
-        fit.chi2 += normal.chi2;
-        for (int i = 0; i < kLocal; ++i) {
-          const int row = places.Of(s, k, i);
-          if (row < 0) {
-            continue;
-          }
-          unknowns[static_cast<size_t>(row)] = &UnknownAt(fit.change, s, k, i);
-          priors[static_cast<size_t>(row)] = PriorOfUnknown(i);
-          gradient[row] += normal.gradient[i];
-          for (int j = 0; j < kLocal; ++j) {
-            const int column = places.Of(s, k, j);
-            if (column >= 0) {
-              matrix(row, column) += normal.matrix(i, j);
-            }
-          }
-        }
-      }
-    }
-    for (size_t i = 0; i < unknowns.size(); ++i) {
-      const auto at = static_cast<Eigen::Index>(i);
-      const double precision = 1.0 / (priors[i] * priors[i]);
-      const double value = unknowns[i] == nullptr ? 0.0 : *unknowns[i];
-      matrix(at, at) += precision;
-      gradient[at] -= precision * value;
-      fit.chi2 += precision * value * value;
-    }
-    const Eigen::LDLT<Eigen::MatrixXd> factors(matrix);
-    const Eigen::VectorXd by = factors.solve(gradient);
-    if (step == kFitSteps || gradient.dot(by) < kSmallGain) {
-      covariance = factors.solve(Eigen::MatrixXd::Identity(places.count, places.count));
+    const ChangeNormal normal(places, NormalsOf(model, weights, fit.change, wanted, task),
+                              fit.change);
+    fit.chi2 = normal.chi2;
+    const Eigen::LDLT<Eigen::MatrixXd> factors(normal.matrix);
+    const Eigen::VectorXd by = factors.solve(normal.gradient);
+    if (step == kFitSteps || normal.gradient.dot(by) < kSmallGain) {
+      covariance = factors.solve(Eigen::MatrixXd::Identity(places.Count(), places.Count()));
       break;
     }
-    for (size_t i = 0; i < unknowns.size(); ++i) {
-      if (unknowns[i] != nullptr) {
-        *unknowns[i] += by[static_cast<Eigen::Index>(i)];
-      }
-    }
+    places.ForEach([&](int place, size_t s, size_t k, int local) {
+      UnknownAt(fit.change, s, k, local) += by[place];
+    });
   }
-  for (const std::array<int, kCameraAt>& place : places.light) {
-    fit.flux.push_back(CovarianceBlock<3>(covariance, place[kFluxAt]));
-    fit.moved_mm2.push_back(CovarianceBlock<3>(covariance, place[kMovedAt]));
-    fit.turned_rad2.push_back(CovarianceBlock<2>(covariance, place[kTurnedAt]));
+  for (size_t k = 0; k < weights.size(); ++k) {
+    fit.flux.push_back(CovarianceBlock<3>(covariance, places.Of(0, k, kFluxAt)));
+    fit.moved_mm2.push_back(CovarianceBlock<3>(covariance, places.Of(0, k, kMovedAt)));
+    fit.turned_rad2.push_back(CovarianceBlock<2>(covariance, places.Of(0, k, kTurnedAt)));
   }
-  fit.camera = CovarianceBlock<4>(covariance, places.camera[0]);
+  fit.camera = CovarianceBlock<4>(covariance, places.Of(0, 0, kCameraAt));
   return fit;
 }
 
-std::vector<ChangeGain> CheckSystem::Gains(const ChangeFit& fit) const {
-  std::vector<ChangeGain> gains(used_.size());
-  std::vector<Wanted> wanted;
-  for (size_t k = 0; k < used_.size(); ++k) {
-    wanted.push_back(WantedOf(k, true, true, false, false));
+std::vector<ChangeGain> GainsOf(const CheckModel& model, const SampleWeights& weights,
+                                const ChangeFit& fit, const Task& task) {
+  std::vector<ChangeGain> gains(weights.size());
+  std::vector<WantedUnknowns> wanted;
+  for (size_t k = 0; k < weights.size(); ++k) {
+    wanted.push_back(model.WantedOf(k, true, true, false, false));
   }
-  const std::vector<std::vector<Normal>> normals = Normals(fit.change, wanted);
+  const LocalNormals normals = NormalsOf(model, weights, fit.change, wanted, task);
   for (size_t k = 0; k < normals.size(); ++k) {
-    Normal sum;
-    for (const Normal& normal : normals[k]) {
-      sum += normal;
-    }
     if (normals[k].empty()) {
       continue;
     }
-    const Eigen::Matrix3d flux = (sum.matrix.block<3, 3>(kFluxAt, kFluxAt)).inverse();
-    // What is left for unknowns [at, at + size) once the flux has followed.
-    const auto gain = [&](auto at, auto size, ChangeGain* into) {
-      constexpr int kSize = decltype(size)::value;
-      const Eigen::Matrix<double, 3, kSize> with_flux =
-          sum.matrix.block<3, kSize>(kFluxAt, decltype(at)::value);
-      Eigen::Matrix<double, kSize, kSize> left =
-          sum.matrix.block<kSize, kSize>(decltype(at)::value, decltype(at)::value) -
-          with_flux.transpose() * flux * with_flux;
-      const double prior = PriorOfUnknown(decltype(at)::value);
-      left.diagonal().array() += 1.0 / (prior * prior);
-      const Eigen::Matrix<double, kSize, 1> gradient =
-          sum.gradient.segment<kSize>(decltype(at)::value) -
-          with_flux.transpose() * flux * sum.gradient.head<3>();
-      const Eigen::Matrix<double, kSize, kSize> covariance = left.inverse();
-      const Eigen::Matrix<double, kSize, 1> by = covariance * gradient;
-      if constexpr (kSize == 3) {
-        into->moved_mm = by;
-        into->moved_mm2 = covariance;
-      }
-      return gradient.dot(by);
-    };
-    gains[k].moved =
-        gain(std::integral_constant<int, kMovedAt>(), std::integral_constant<int, 3>(), &gains[k]);
-    gains[k].turned =
-        gain(std::integral_constant<int, kTurnedAt>(), std::integral_constant<int, 2>(), &gains[k]);
+    LocalNormal sum;
+    for (const LocalNormal& normal : normals[k]) {
+      sum += normal;
+    }
+    sum.AddPriorsOf(k, fit.change);
+    const FollowedStep<3> moved = StepWithFlux<kMovedAt, 3>(sum);
+    const FollowedStep<2> turned = StepWithFlux<kTurnedAt, 2>(sum);
+    gains[k] = {moved.gain, turned.gain, moved.covariance};
   }
   return gains;
 }

@@ -1,96 +1,97 @@
+#include "calibration/check/check_settle.h"
+
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <utility>
 
-#include "calibration/check/check_system.h"
 #include "calibration/check/check_unknowns.h"
 #include "calibration/fit/robust_spread.h"
+#include "core/parallel.h"
 
 namespace sateen {
-
 namespace {
 
-constexpr int kSettleSteps = 8;           // of a robust fit
-constexpr double kSettleLossScale = 2.0;  // of the residuals' spread
+constexpr int kSettleSteps = 8;
+constexpr double kSettleLossScale = 2.0;  // times the residuals' spread
 constexpr double kSettleOutlierScale = 4.0;
-constexpr int kTogether = 6;  // blocks along a square over which residuals may hang together
+constexpr int kSquareBlocks = 6;  // along a side, over which residuals may be correlated
 
-}  // namespace
-
-// A robust fit of the light alone, whatever it needs; then the noise, from what that leaves.
-void CheckSystem::Settle(size_t light) {
-  RigChange change = Unchanged();
-  Weights& weights = weights_[light];
-  weights.resize(sheets_.size());
+// Residuals of one light on all sheets.
+struct SettleResiduals {
+  std::vector<std::vector<double>> off;  // [sheet][3 per sample]
   double spread = 1.0;
-  std::vector<std::vector<double>> off(sheets_.size());
-  const auto look = [&] {
+
+  SettleResiduals(const CheckModel& model, size_t light, const RigChange& change) {
     std::vector<double> all;
-    for (size_t s = 0; s < sheets_.size(); ++s) {
-      off[s] = Residuals(s, light, change);
+    for (size_t s = 0; s < model.Sheets().size(); ++s) {
+      off.push_back(model.Residuals(s, light, change));
       all.insert(all.end(), off[s].begin(), off[s].end());
     }
-    spread = SpreadOf(all);
-  };
-  // Of the worst of a sample's three residuals, in units of the spread.
-  const auto worst = [&](size_t s, size_t j) {
-    return std::max({std::abs(off[s][3 * j]), std::abs(off[s][3 * j + 1]),
-                     std::abs(off[s][3 * j + 2])}) /
-           spread;
-  };
-  look();
-  for (int step = 0; step < kSettleSteps; ++step) {
-    Normal sum;
-    for (size_t s = 0; s < sheets_.size(); ++s) {
-      weights[s].resize(off[s].size() / 3);
-      for (size_t j = 0; j < weights[s].size(); ++j) {
-        const double scaled = worst(s, j) / kSettleLossScale;
-        weights[s][j] = 1.0 / (spread * spread * (1.0 + scaled * scaled));
-      }
-      sum += NormalOf(s, light, change, weights[s], WantedOf(light, true, true, false, false));
-    }
-    Eigen::Matrix<double, kOfLight, kOfLight> matrix =
-        sum.matrix.topLeftCorner<kOfLight, kOfLight>();
-    Eigen::Matrix<double, kOfLight, 1> gradient = sum.gradient.head<kOfLight>();
-    for (int i = 0; i < kOfLight; ++i) {
-      matrix(i, i) += 1.0 / (PriorOfUnknown(i) * PriorOfUnknown(i));
-      gradient[i] -= UnknownAt(change, 0, light, i) / (PriorOfUnknown(i) * PriorOfUnknown(i));
-    }
-    const Eigen::Matrix<double, kOfLight, 1> by = matrix.ldlt().solve(gradient);
-    for (int i = 0; i < kOfLight; ++i) {
-      UnknownAt(change, 0, light, i) += by[i];
-    }
-    look();
+    spread = all.empty() ? 1.0 : SpreadOf(all);
   }
-  const double together = SpreadTogether(light, change);
-  for (size_t s = 0; s < sheets_.size(); ++s) {
-    for (size_t j = 0; j < weights[s].size(); ++j) {
-      weights[s][j] = worst(s, j) <= kSettleOutlierScale ? 1.0 / (spread * spread * together) : 0.0;
+
+  [[nodiscard]] size_t SampleCount(size_t sheet) const { return off[sheet].size() / 3; }
+
+  // Returns the largest of a sample's three residuals, in units of the spread.
+  [[nodiscard]] double Worst(size_t sheet, size_t j) const {
+    const double* r = &off[sheet][3 * j];
+    return std::max({std::abs(r[0]), std::abs(r[1]), std::abs(r[2])}) / spread;
+  }
+
+  // Returns a weight for each sample: of its worst residual, in units of the spread.
+  template <typename WeightOf>
+  [[nodiscard]] SheetWeights Weights(const WeightOf& weight_of) const {
+    SheetWeights weights(off.size());
+    for (size_t s = 0; s < off.size(); ++s) {
+      for (size_t j = 0; j < SampleCount(s); ++j) {
+        weights[s].push_back(weight_of(Worst(s, j)));
+      }
     }
+    return weights;
+  }
+};
+
+// Moves one light by one step of Gauss and Newton's method.
+void StepLight(const CheckModel& model, size_t light, const SheetWeights& weights,
+               RigChange& change) {
+  const WantedUnknowns wanted = model.WantedOf(light, true, true, false, false);
+  LocalNormal sum;
+  for (size_t s = 0; s < weights.size(); ++s) {
+    sum += model.NormalOf(s, light, change, weights[s], wanted);
+  }
+  sum.AddPriorsOf(light, change);
+  const Eigen::Matrix<double, kOfLight, kOfLight> matrix =
+      sum.matrix.topLeftCorner<kOfLight, kOfLight>();
+  const Eigen::Matrix<double, kOfLight, 1> by = matrix.ldlt().solve(sum.gradient.head<kOfLight>());
+  for (int i = 0; i < kOfLight; ++i) {
+    UnknownAt(change, 0, light, i) += by[i];
   }
 }
 
-// By how much the means of squares of blocks vary more than they would if blocks did not hang
-// together; at least 1.
-double CheckSystem::SpreadTogether(size_t light, const RigChange& change) const {
+// Returns V_6 / V_1 of (1), at least 1, from the green residuals.
+double CorrelationOf(const CheckModel& model, size_t light, const SettleResiduals& residuals) {
   double single = 0.0;
   double squares = 0.0;
   double single_count = 0.0;
   double square_count = 0.0;
-  for (size_t s = 0; s < sheets_.size(); ++s) {
-    const CheckedSheet& sheet = sheets_[s];
-    const std::vector<double> off = Residuals(s, light, change);
+  for (size_t s = 0; s < residuals.off.size(); ++s) {
+    const SheetReadings& sheet = model.Sheets()[s];
+    const std::vector<double>& off = residuals.off[s];
+    if (off.empty()) {
+      continue;
+    }
     const double limit = kSettleOutlierScale * SpreadOf(off);
-    std::map<int, std::pair<double, double>> sums;  // of a square: sum, count
-    for (size_t j = 0; j < off.size() / 3; ++j) {
+    std::map<int, std::pair<double, double>> sums;  // of each square: sum and count
+    for (size_t j = 0; j < residuals.SampleCount(s); ++j) {
       const double green = off[3 * j + 1];
       if (std::abs(green) > limit) {
         continue;
       }
       const int block = sheet.blocks[light][j];
-      const int column = block % sheet.columns / kTogether;
-      const int row = block / sheet.columns / kTogether;
+      const int column = block % sheet.columns / kSquareBlocks;
+      const int row = block / sheet.columns / kSquareBlocks;
       auto& [sum, count] = sums[row * sheet.columns + column];
       sum += green;
       count += 1.0;
@@ -103,6 +104,41 @@ double CheckSystem::SpreadTogether(size_t light, const RigChange& change) const 
     }
   }
   return single > 0.0 ? std::max(1.0, squares / square_count / (single / single_count)) : 1.0;
+}
+
+}  // namespace
+
+SettledLight SettleLight(const CheckModel& model, size_t light) {
+  RigChange change = model.Unchanged();
+  SettleResiduals residuals(model, light, change);
+  for (int step = 0; step < kSettleSteps; ++step) {
+    const double variance = residuals.spread * residuals.spread;
+    const SheetWeights weights = residuals.Weights([&](double worst) {
+      const double scaled = worst / kSettleLossScale;
+      return 1.0 / (variance * (1.0 + scaled * scaled));
+    });
+    StepLight(model, light, weights, change);
+    residuals = SettleResiduals(model, light, change);
+  }
+  const double variance =
+      residuals.spread * residuals.spread * CorrelationOf(model, light, residuals);
+  return {.change = change.lights[light], .weights = residuals.Weights([&](double worst) {
+            return worst <= kSettleOutlierScale ? 1.0 / variance : 0.0;
+          })};
+}
+
+SampleWeights SettledWeights(const CheckModel& model, const std::vector<bool>& used,
+                             const Task& task) {
+  SampleWeights weights(used.size());
+  (void)ParallelFor(static_cast<int>(used.size()), 1, Task{.threads = task.threads},
+                    [&](int begin, int end) {
+                      for (auto k = static_cast<size_t>(begin); k < static_cast<size_t>(end); ++k) {
+                        if (used[k]) {
+                          weights[k] = SettleLight(model, k).weights;
+                        }
+                      }
+                    });
+  return weights;
 }
 
 }  // namespace sateen

@@ -1,87 +1,59 @@
 #pragma once
 
-#include <Eigen/Geometry>
+#include <Eigen/Core>
 #include <array>
-#include <utility>
 
-#include "calibration/check/check_system.h"
+#include "calibration/check/rig_change.h"
 #include "core/angle.h"
 
-// What the parts of CheckSystem agree on: where its unknowns are, and what each does.
+// Unknowns on which the readings of one light on one sheet depend: their order, priors and steps.
 namespace sateen {
 
-// Where the unknowns of one light and sheet are.
-inline constexpr int kFluxAt = 0;
+inline constexpr int kFluxAt = 0;  // first unknown of each kind
 inline constexpr int kMovedAt = 3;
 inline constexpr int kTurnedAt = 6;
 inline constexpr int kCameraAt = 8;
 inline constexpr int kSheetAt = 12;
+inline constexpr int kOfLight = kCameraAt;  // flux, position, axis
+inline constexpr int kLocal = kSheetAt + 6;
 
-inline constexpr double kDifferenceMm = 0.01;  // of the central differences
-inline constexpr double kDifferenceRad = 1e-5;
-inline constexpr double kFluxPrior = 3.0;  // standard deviations of what is likely
+// Priors are normal distributions about no change, of these standard deviations.
+inline constexpr double kFluxPrior = 3.0;  // of the logarithm
 inline constexpr double kMovedPriorMm = 100.0;
 inline constexpr double kTurnedPriorRad = 20.0 * kRadPerDeg;
 inline constexpr double kCameraPriorMm = 50.0;
 inline constexpr double kCameraPriorRad = 5.0 * kRadPerDeg;
 inline constexpr double kSheetPriorMm = 5.0;
 
-inline double PriorOfUnknown(int local) {
-  if (local < kMovedAt) {
-    return kFluxPrior;
-  }
-  if (local < kTurnedAt) {
-    return kMovedPriorMm;
-  }
-  if (local < kCameraAt) {
-    return kTurnedPriorRad;
-  }
-  if (local < kSheetAt) {
-    return local == kSheetAt - 1 ? kCameraPriorRad : kCameraPriorMm;
-  }
-  return kSheetPriorMm;
-}
+// Term (x / s)^2 of an unknown x whose prior has the standard deviation s.
+struct PriorTerm {
+  double precision = 0.0;  // 1 / s^2: its share in the normal matrix
+  double gradient = 0.0;   // -x / s^2: its share in the right side
+  double chi2 = 0.0;
+};
 
-inline double StepOfUnknown(int local) {
-  const bool is_angle = (local >= kTurnedAt && local < kCameraAt) || local == kSheetAt - 1;
-  return is_angle ? kDifferenceRad : kDifferenceMm;
-}
+/// Returns the prior's term of unknown `local` at this value.
+[[nodiscard]] PriorTerm PriorOfUnknown(int local, double value);
 
-// The unknown `local` of one light and sheet.
-inline double& UnknownAt(RigChange& change, size_t sheet, size_t light, int local) {
-  if (local < kMovedAt) {
-    return change.lights[light].log_flux[local];
-  }
-  if (local < kTurnedAt) {
-    return change.lights[light].moved_mm[local - kMovedAt];
-  }
-  if (local < kCameraAt) {
-    return change.lights[light].turned_rad[local - kTurnedAt];
-  }
-  return local < kSheetAt ? change.camera[local - kCameraAt]
-                          : change.sheets[sheet][local - kSheetAt];
-}
+/// Returns the step of central differences by unknown `local`: 0.01 mm or 1e-5 rad.
+[[nodiscard]] double StepOfUnknown(int local);
 
-// Two unit vectors across another.
-inline std::pair<Eigen::Vector3d, Eigen::Vector3d> AcrossAxis(const Eigen::Vector3d& axis) {
-  const Eigen::Vector3d a = axis.unitOrthogonal();
-  return {a, axis.cross(a)};
-}
+/// Returns unknown `local` of one light and sheet, where a change keeps it.
+[[nodiscard]] double& UnknownAt(RigChange& change, size_t sheet, size_t light, int local);
+[[nodiscard]] double UnknownAt(const RigChange& change, size_t sheet, size_t light, int local);
 
-inline Light ChangedLight(const Light& light, const LightChange& change) {
-  Light now = light;
-  now.position_mm += change.moved_mm;
-  now.field.origin_mm += change.moved_mm.head<2>();  // its gains go with the lamp
-  const auto [a, b] = AcrossAxis(light.axis);
-  now.axis = (light.axis + change.turned_rad[0] * a + change.turned_rad[1] * b).normalized();
-  now.flux_rgb.array() *= change.log_flux.array().exp();
-  return now;
-}
+// Normal equations A x = b of the readings of one light on one sheet.
+struct LocalNormal {
+  Eigen::Matrix<double, kLocal, kLocal> matrix = Eigen::Matrix<double, kLocal, kLocal>::Zero();
+  Eigen::Matrix<double, kLocal, 1> gradient = Eigen::Matrix<double, kLocal, 1>::Zero();  // b
+  double chi2 = 0.0;
 
-// z of (2) and its derivatives.
-inline std::array<double, 3> SheetHeightAt(const SheetHeights& h, double u, double v) {
-  return {h[0] + h[1] * u + h[2] * v + h[3] * u * u + h[4] * u * v + h[5] * v * v,
-          h[1] + 2.0 * h[3] * u + h[4] * v, h[2] + h[4] * u + 2.0 * h[5] * v};
-}
+  LocalNormal& operator+=(const LocalNormal& other);
+  // Adds the priors of the light's own unknowns, at their values in `change`.
+  void AddPriorsOf(size_t light, const RigChange& change);
+};
+
+// Unknowns by which derivatives are needed.
+using WantedUnknowns = std::array<bool, kLocal>;
 
 }  // namespace sateen

@@ -7,6 +7,9 @@
 #include <limits>
 
 #include "calibration/check/change_choice.h"
+#include "calibration/check/check_fit.h"
+#include "calibration/check/check_model.h"
+#include "calibration/check/check_settle.h"
 #include "calibration/check/lit_from.h"
 #include "core/angle.h"
 
@@ -36,24 +39,26 @@ double WorstDirectionChange(const std::vector<SheetSample>& samples,
 
 class Checker {
  public:
-  Checker(const Rig& rig, const std::vector<CheckedSheet>& sheets, const LightCheckOptions& options,
-          std::vector<bool> used, const Task& task, RigCheck& check)
+  Checker(const Rig& rig, const std::vector<SheetReadings>& sheets,
+          const LightCheckOptions& options, std::vector<bool> used, const Task& task,
+          RigCheck& check)
       : rig_(rig),
         sheets_(sheets),
         options_(options),
         used_(std::move(used)),
         task_(task),
         check_(check),
-        system_(rig, sheets, options.albedo, used_, task) {}
+        model_(rig, sheets, options.albedo),
+        weights_(SettledWeights(model_, used_, task)) {}
 
   Status Run() {
-    Result<ChangeChoice> choice = ChooseChange(system_, used_.size(), sheets_.size(), task_);
+    Result<ChangeChoice> choice = ChooseChange(model_, weights_, task_);
     if (!choice) {
       return tl::unexpected(choice.error());
     }
     fit_ = std::move(choice->fit);
     mask_ = std::move(choice->mask);
-    gains_ = system_.Gains(fit_);
+    gains_ = GainsOf(model_, weights_, fit_, task_);
     check_.change = fit_.change;
     JudgeFlux();
     for (size_t k = 0; k < used_.size(); ++k) {
@@ -125,7 +130,7 @@ class Checker {
     double most = 0.0;
     for (const SheetSample& sample : sheets_[0].samples[k]) {
       const double ratio =
-          system_.Predict(0, k, sample, fit_.change)[1] / system_.Predict(0, k, sample, without)[1];
+          model_.Predict(0, k, sample, fit_.change)[1] / model_.Predict(0, k, sample, without)[1];
       least = std::min(least, ratio);
       most = std::max(most, ratio);
     }
@@ -177,9 +182,9 @@ class Checker {
     for (size_t s = 0; s < sheets_.size(); ++s) {
       SheetSurface surface =
           SurfaceOf(sheets_[s], rig_.lights, [&](size_t k, const SheetSample& sample) {
-            return used_[k] ? system_.Predict(s, k, sample, fit_.change)[1] : 0.0;
+            return used_[k] ? model_.Predict(s, k, sample, fit_.change)[1] : 0.0;
           });
-      const CheckSystem::Lie lie = system_.LieOf(s, fit_.change);
+      const CheckModel::Lie lie = model_.LieOf(s, fit_.change);
       surface.slope_deg = lie.slope_rad * kDegPerRad;
       surface.height_mm = lie.height_mm;
       surface.is_off = surface.slope_deg > options_.max_sheet_deg ||
@@ -190,13 +195,13 @@ class Checker {
   }
 
   void Compare() {
-    const RigChange unchanged = system_.Unchanged();
+    const RigChange unchanged = model_.Unchanged();
     check_.ratios.resize(sheets_.size());
     for (size_t s = 0; s < sheets_.size(); ++s) {
       for (size_t k = 0; k < rig_.lights.size(); ++k) {
         std::vector<double>& ratios = check_.ratios[s].emplace_back();
         for (const SheetSample& sample : sheets_[s].samples[k]) {
-          const double expected = system_.Predict(s, k, sample, unchanged)[1];
+          const double expected = model_.Predict(s, k, sample, unchanged)[1];
           ratios.push_back(expected > 0.0 ? sample.radiance_rgb[1] / expected : 0.0);
         }
       }
@@ -204,19 +209,20 @@ class Checker {
   }
 
   const Rig& rig_;
-  const std::vector<CheckedSheet>& sheets_;
+  const std::vector<SheetReadings>& sheets_;
   const LightCheckOptions& options_;
   std::vector<bool> used_;
   Task task_;
   RigCheck& check_;
-  CheckSystem system_;
+  CheckModel model_;
+  SampleWeights weights_;
   ChangeFit fit_;
   ChangeMask mask_;
   std::vector<ChangeGain> gains_;
   Eigen::Vector3d common_ = Eigen::Vector3d::Zero();  // log flux of all lights
 };
 
-Status CheckArguments(const Rig& rig, const std::vector<CheckedSheet>& sheets) {
+Status CheckArguments(const Rig& rig, const std::vector<SheetReadings>& sheets) {
   if (!rig.camera) {
     return Fail(ErrorCode::kInvalidArgument,
                 "the rig has no camera; calibrate lens and pose first");
@@ -269,7 +275,7 @@ Status LightCheckOptions::Validate() const {
       .and_then([&] { return InRange("significance", significance, 1.99, 100.01); });
 }
 
-Result<RigCheck> CheckRig(const Rig& rig, const std::vector<CheckedSheet>& sheets,
+Result<RigCheck> CheckRig(const Rig& rig, const std::vector<SheetReadings>& sheets,
                           const std::vector<FrameFault>& faults, const LightCheckOptions& options,
                           const Task& task) {
   if (Status status = options.Validate().and_then([&] { return CheckArguments(rig, sheets); });
@@ -282,7 +288,7 @@ Result<RigCheck> CheckRig(const Rig& rig, const std::vector<CheckedSheet>& sheet
   for (size_t k = 0; k < rig.lights.size(); ++k) {
     LightCheck& light = check.lights[k];
     const bool has_samples = std::ranges::all_of(
-        sheets, [&](const CheckedSheet& s) { return s.samples[k].size() >= kFewestSamples; });
+        sheets, [&](const SheetReadings& s) { return s.samples[k].size() >= kFewestSamples; });
     if (!has_samples) {
       light.verdict =
           faults[k] == FrameFault::kSaturated ? LightVerdict::kSaturated : LightVerdict::kDark;

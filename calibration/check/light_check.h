@@ -6,8 +6,9 @@
 #include <string_view>
 #include <vector>
 
-#include "calibration/check/check_system.h"
+#include "calibration/check/rig_change.h"
 #include "calibration/check/sheet_surface.h"
+#include "calibration/sheet/sheet_readings.h"
 #include "core/error.h"
 #include "core/task.h"
 #include "rig/rig.h"
@@ -90,7 +91,7 @@ struct RigCheck {
 };
 
 /// Whether sheets of white paper still look as the rig says, and if not, what has changed. Explanations
-/// are those of CheckSystem; chosen is the one with the least chi2 + 15 per parameter, among: lights
+/// are those of check_model.h; chosen is the one with the least chi2 + 15 per parameter, among: lights
 /// moved or turned one by one, as many as need be; the camera moved; sheets not lying as said;
 /// and each with the others. A flux is free in each channel of each light.
 ///
@@ -104,7 +105,7 @@ struct RigCheck {
 /// Errors   kInvalidArgument: an option out of range; no camera; a distant light
 ///          kDegenerate: no light with at least 50 samples
 /// Cost     about 0.1 ms a sample
-[[nodiscard]] Result<RigCheck> CheckRig(const Rig& rig, const std::vector<CheckedSheet>& sheets,
+[[nodiscard]] Result<RigCheck> CheckRig(const Rig& rig, const std::vector<SheetReadings>& sheets,
                                         const std::vector<FrameFault>& faults,
                                         const LightCheckOptions& options = {},
                                         const Task& task = {});

@@ -33,7 +33,7 @@ struct SurfaceSystem {
 
 }  // namespace
 
-SheetSurface SurfaceOf(const CheckedSheet& sheet, const Lights& lights,
+SheetSurface SurfaceOf(const SheetReadings& sheet, const Lights& lights,
                        const ExpectedGreen& expected) {
   std::vector<SurfaceSystem> blocks(static_cast<size_t>(sheet.columns) *
                                     static_cast<size_t>(sheet.rows));

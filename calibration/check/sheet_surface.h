@@ -2,7 +2,8 @@
 
 #include <functional>
 
-#include "calibration/check/check_system.h"
+#include "calibration/sheet/sheet_readings.h"
+#include "rig/light.h"
 
 namespace sateen {
 
@@ -30,7 +31,7 @@ struct SheetSurface {
 ///
 /// height, slope, is_off are left to the caller. Nothing is found with fewer than four lights.
 using ExpectedGreen = std::function<double(size_t light, const SheetSample& sample)>;
-[[nodiscard]] SheetSurface SurfaceOf(const CheckedSheet& sheet, const Lights& lights,
+[[nodiscard]] SheetSurface SurfaceOf(const SheetReadings& sheet, const Lights& lights,
                                      const ExpectedGreen& expected);
 
 }  // namespace sateen

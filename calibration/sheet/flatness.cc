@@ -50,7 +50,7 @@ struct BlockNormal {
   }
 };
 
-std::vector<BlockNormal> SystemsOf(const SheetView& sheet, const IncidentOf& incident) {
+std::vector<BlockNormal> SystemsOf(const SheetReadings& sheet, const IncidentOf& incident) {
   std::vector<BlockNormal> systems(static_cast<size_t>(sheet.columns) *
                                    static_cast<size_t>(sheet.rows));
   for (size_t k = 0; k < sheet.samples.size(); ++k) {
@@ -132,7 +132,7 @@ Status FlatnessOptions::Validate() const {
   return {};
 }
 
-Result<Flatness> FlatnessOf(const SheetView& sheet, const IncidentOf& incident,
+Result<Flatness> FlatnessOf(const SheetReadings& sheet, const IncidentOf& incident,
                             const FlatnessOptions& options) {
   if (Status status = options.Validate(); !status) {
     return tl::unexpected(status.error());
@@ -158,7 +158,7 @@ Result<Flatness> FlatnessOf(const SheetView& sheet, const IncidentOf& incident,
   return flatness;
 }
 
-Result<Flatness> FlatnessOf(const SheetView& sheet, const Lights& lights,
+Result<Flatness> FlatnessOf(const SheetReadings& sheet, const Lights& lights,
                             const FlatnessOptions& options) {
   return FlatnessOf(
       sheet,

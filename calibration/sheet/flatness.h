@@ -4,20 +4,11 @@
 #include <functional>
 #include <vector>
 
-#include "calibration/sheet/sheet_sample.h"
+#include "calibration/sheet/sheet_readings.h"
 #include "core/error.h"
 #include "rig/light.h"
 
 namespace sateen {
-
-// White paper under K lights, borrowed: samples[k][i] is block blocks[k][i] of columns x rows blocks,
-// rows from the top.
-struct SheetView {
-  int columns = 0;
-  int rows = 0;
-  const std::vector<std::vector<SheetSample>>& samples;
-  const std::vector<std::vector<int>>& blocks;
-};
 
 struct FlatnessOptions {
   // Side of a tile, about: what is averaged before the worst is looked for. [mm], > 0. Half a period
@@ -50,11 +41,11 @@ using IncidentOf = std::function<Incident(size_t light, size_t sample)>;
 /// Errors  kInvalidArgument: an option out of range
 ///         kDegenerate: no tile whose blocks are seen under three lights
 /// Cost    about 1 us a block
-[[nodiscard]] Result<Flatness> FlatnessOf(const SheetView& sheet, const IncidentOf& incident,
+[[nodiscard]] Result<Flatness> FlatnessOf(const SheetReadings& sheet, const IncidentOf& incident,
                                           const FlatnessOptions& options = {});
 
 // With these lights as rig/light.h has them.
-[[nodiscard]] Result<Flatness> FlatnessOf(const SheetView& sheet, const Lights& lights,
+[[nodiscard]] Result<Flatness> FlatnessOf(const SheetReadings& sheet, const Lights& lights,
                                           const FlatnessOptions& options = {});
 
 }  // namespace sateen

@@ -62,18 +62,17 @@ struct Votes {
   }
 };
 
-Votes Count(const std::vector<std::vector<SheetSample>>& samples,
-            const std::vector<std::vector<int>>& blocks, size_t count, const Lights& lights,
-            double albedo) {
+Votes Count(const SheetReadings& sheet, const Lights& lights, double albedo) {
+  const size_t count = static_cast<size_t>(sheet.columns) * static_cast<size_t>(sheet.rows);
   Votes votes{std::vector<int>(count, 0), std::vector<int>(count, 0),
               std::vector<Eigen::Vector2d>(count, Eigen::Vector2d::Zero()),
               std::vector<size_t>(lights.size(), 0)};
   for (size_t k = 0; k < lights.size(); ++k) {
-    const std::vector<double> offsets = OffsetsOf(samples[k], lights[k], albedo);
+    const std::vector<double> offsets = OffsetsOf(sheet.samples[k], lights[k], albedo);
     for (size_t i = 0; i < offsets.size(); ++i) {
-      const auto block = static_cast<size_t>(blocks[k][i]);
+      const auto block = static_cast<size_t>(sheet.blocks[k][i]);
       ++votes.seen[block];
-      votes.at_mm[block] = samples[k][i].point_mm.head<2>();
+      votes.at_mm[block] = sheet.samples[k][i].point_mm.head<2>();
       if (offsets[i] > kOffSigmas) {
         ++votes.off[block];
         ++votes.off_of_light[k];
@@ -115,15 +114,13 @@ bool IsAtRim(int block, int columns, int rows) {
 
 }  // namespace
 
-std::optional<SheetFault> FindSheetFault(const std::vector<std::vector<SheetSample>>& samples,
-                                         const std::vector<std::vector<int>>& blocks, int columns,
-                                         int rows, const Lights& lights, double albedo) {
-  const Votes votes = Count(
-      samples, blocks, static_cast<size_t>(columns) * static_cast<size_t>(rows), lights, albedo);
+std::optional<SheetFault> FindSheetFault(const SheetReadings& sheet, const Lights& lights,
+                                         double albedo) {
+  const Votes votes = Count(sheet, lights, albedo);
   std::vector<Eigen::Vector2d> faulty;
   std::vector<Eigen::Vector2d> all;
   size_t at_rim = 0;
-  for (int block = 0; block < columns * rows; ++block) {
+  for (int block = 0; block < sheet.columns * sheet.rows; ++block) {
     const auto at = static_cast<size_t>(block);
     if (votes.seen[at] == 0) {
       continue;
@@ -131,7 +128,7 @@ std::optional<SheetFault> FindSheetFault(const std::vector<std::vector<SheetSamp
     all.push_back(votes.at_mm[at]);
     if (votes.IsFaulty(at)) {
       faulty.push_back(votes.at_mm[at]);
-      at_rim += IsAtRim(block, columns, rows) ? 1 : 0;
+      at_rim += IsAtRim(block, sheet.columns, sheet.rows) ? 1 : 0;
     }
   }
   if (static_cast<double>(faulty.size()) <

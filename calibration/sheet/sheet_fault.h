@@ -4,7 +4,7 @@
 #include <optional>
 #include <vector>
 
-#include "calibration/sheet/sheet_sample.h"
+#include "calibration/sheet/sheet_readings.h"
 #include "core/error.h"
 #include "rig/light.h"
 
@@ -26,12 +26,9 @@ struct SheetFault {
 /// would show, under at least two lights and a fifth of those that saw them: a fold, dust, a stain,
 /// or what lies beyond the paper's edge. What a single light lacks is not the paper's fault.
 ///
-/// samples, blocks  [light][sample]; blocks says which block of columns x rows each sample is
-/// lights           fitted, in the same order
+/// lights   fitted, in the order of the readings
 /// Returns  nothing where they are less than 0.4 % of the sheet
-[[nodiscard]] std::optional<SheetFault> FindSheetFault(
-    const std::vector<std::vector<SheetSample>>& samples,
-    const std::vector<std::vector<int>>& blocks, int columns, int rows, const Lights& lights,
-    double albedo);
+[[nodiscard]] std::optional<SheetFault> FindSheetFault(const SheetReadings& sheet,
+                                                       const Lights& lights, double albedo);
 
 }  // namespace sateen

@@ -153,7 +153,7 @@ class RigChecker {
 
   const CalibrateCheckArgs& args_;
   const Task task_;
-  std::vector<CheckedSheet> views_;
+  std::vector<SheetReadings> views_;
   std::vector<FrameFault> faults_;
   CalibrationCheck result_;
 };

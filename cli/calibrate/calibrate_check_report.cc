@@ -241,7 +241,7 @@ std::string TextReport(const CalibrateCheckArgs& args, const CalibrationCheck& r
   return text;
 }
 
-Rgb8 RatioPicture(const CalibrationCheck& result, size_t sheet, const CheckedSheet& view) {
+Rgb8 RatioPicture(const CalibrationCheck& result, size_t sheet, const SheetReadings& view) {
   std::vector<Rgb8> panels;
   for (size_t k = 0; k < view.samples.size(); ++k) {
     Rgb8 panel;

@@ -20,6 +20,6 @@ void SayWhatIsWrong(const CalibrateCheckArgs& args, CalibrationCheck& result);
 // all lights have in common taken off. Light grey as expected, blue 2 % darker, red 2 % brighter, dark
 // grey where there is nothing.
 [[nodiscard]] Rgb8 RatioPicture(const CalibrationCheck& result, size_t sheet,
-                                const CheckedSheet& view);
+                                const SheetReadings& view);
 
 }  // namespace sateen::cli

@@ -80,7 +80,10 @@ class Comparison {
     for (size_t s = 0; s < sheets_.size(); ++s) {
       const Sheet& sheet = sheets_[s];
       const Result<Flatness> flatness =
-          FlatnessOf(SheetView{sheet.grid.columns, sheet.grid.rows, sheet.samples, sheet.blocks},
+          FlatnessOf({.columns = sheet.grid.columns,
+                      .rows = sheet.grid.rows,
+                      .samples = sheet.samples,
+                      .blocks = sheet.blocks},
                      [&](size_t k, size_t i) { return incident(sheet, k, i); });
       if (!flatness) {
         return figures;

@@ -38,8 +38,11 @@ Result<SheetFigures> FiguresOfSheet(const std::filesystem::path& dir, const Shee
 
 std::optional<std::string> FaultOfSheet(const std::filesystem::path& dir, const Sheet& sheet,
                                         const Lights& lights, double albedo) {
-  const std::optional<SheetFault> fault = FindSheetFault(
-      sheet.samples, sheet.blocks, sheet.grid.columns, sheet.grid.rows, lights, albedo);
+  const std::optional<SheetFault> fault = FindSheetFault({.columns = sheet.grid.columns,
+                                                          .rows = sheet.grid.rows,
+                                                          .samples = sheet.samples,
+                                                          .blocks = sheet.blocks},
+                                                         lights, albedo);
   if (!fault) {
     return std::nullopt;
   }

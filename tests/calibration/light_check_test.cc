@@ -4,65 +4,32 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "simulation/rigs.h"
-#include "tests/calibration/synthetic_sheets.h"
+#include "tests/calibration/actual_over_predicted.h"
+#include "tests/calibration/synthetic_readings.h"
 
 namespace sateen::light_check_test {
 namespace {
 
-using sateen::testing::SamplesOf;
+using sateen::testing::ActualOverPredicted;
+using sateen::testing::CalibratedRig;
+using sateen::testing::ReadingsGrid;
+using sateen::testing::ReadingsOf;
 using sateen::testing::SamplesOn;
 using sateen::testing::SyntheticCamera;
 using ::testing::HasSubstr;
 
-constexpr int kColumns = 18;
-constexpr int kRows = 12;
+constexpr int kColumns = ReadingsGrid().columns;
+constexpr int kRows = ReadingsGrid().rows;
 
-// The scanner of The Order: 1886 with a camera of `size`, and what it sees today.
+// A rig as calibrated, and what it sees today.
 struct Today {
-  Rig rig;  // as calibrated
-  std::vector<CheckedSheet> sheets;
+  Rig rig;
+  std::vector<SheetReadings> sheets;
   std::vector<FrameFault> faults;
 };
 
-Rig CalibratedRig(LightModel model = LightModel::kNear, ImageSize size = {4928, 3264}) {
-  Rig rig = RingRig(size, model, 300.0);
-  for (size_t k = 0; k < rig.lights.size(); ++k) {
-    rig.lights[k].flux_rgb =
-        Eigen::Vector3d(0.40, 0.36, 0.30) * (1.0 + 0.02 * static_cast<double>(k));
-  }
-  for (Light& light : rig.lights) {
-    if (model == LightModel::kLedField) {
-      light.field = {.origin_mm = {-300.0, -300.0}, .spacing_mm = 100.0, .columns = 7, .rows = 7};
-      light.field.gain.assign(49, 1.0);
-      light.field.gain[24] = 1.1;  // a bright middle
-    }
-  }
-  return rig;
-}
-
-// Blocks as `actual` shows them, at the places that the camera of `rig` gives.
 Today See(const Rig& rig, const Rig& actual, int sheets, uint64_t seed) {
-  Today today{.rig = rig, .faults = std::vector<FrameFault>(rig.lights.size())};
-  const SyntheticCamera expects{.camera = *rig.camera, .columns = kColumns, .rows = kRows};
-  const SyntheticCamera sees{.camera = *actual.camera, .columns = kColumns, .rows = kRows};
-  const size_t blocks = kColumns * kRows;
-  today.sheets.resize(static_cast<size_t>(sheets), {.columns = kColumns, .rows = kRows});
-  for (size_t k = 0; k < rig.lights.size(); ++k) {
-    const std::vector<SheetSample> at = SamplesOf(expects, rig.lights[k], sheets, 0);
-    const std::vector<SheetSample> is = SamplesOf(sees, actual.lights[k], sheets, 1000 * seed + k);
-    for (size_t s = 0; s < today.sheets.size(); ++s) {
-      std::vector<SheetSample>& samples = today.sheets[s].samples.emplace_back();
-      std::vector<int>& places = today.sheets[s].blocks.emplace_back();
-      for (size_t j = 0; j < blocks; ++j) {
-        SheetSample sample = is[s * blocks + j];
-        sample.point_mm = at[s * blocks + j].point_mm;
-        samples.push_back(sample);
-        places.push_back(static_cast<int>(j));
-      }
-    }
-  }
-  return today;
+  return {rig, ReadingsOf(rig, actual, sheets, seed), std::vector<FrameFault>(rig.lights.size())};
 }
 
 RigCheck Check(const Today& today, const LightCheckOptions& options = {}) {
@@ -308,6 +275,36 @@ TEST(LightCheck, AFoldIsCountedAndHurtsNoLight) {
   EXPECT_EQ(check.sheets[0].spots, 0.0);
 }
 
+// What a check says of its own errors is measured on a grid of 6 squares, whose scatter it may take
+// for correlation: its standard deviations are up to a tenth too wide.
+TEST(LightCheck, ErrorsAreWithinTheirStandardDeviations) {
+  ActualOverPredicted flux;
+  ActualOverPredicted moved;
+  ActualOverPredicted camera;
+  Rig actual = CalibratedRig();
+  actual.lights[7].position_mm += Eigen::Vector3d(4.0, -3.0, 5.0);
+  actual.camera->table_from_camera.pretranslate(Eigen::Vector3d(2.0, 1.0, 0.0));
+  for (uint64_t seed = 1; seed <= 40; ++seed) {
+    const RigCheck check = Check(See(CalibratedRig(), actual, 3, 5000 + seed));
+    ASSERT_EQ(VerdictsOf(check), Only(7, LightVerdict::kMoved));
+    for (Eigen::Index i = 0; i < 3; ++i) {
+      for (const LightCheck& light : check.lights) {
+        flux.Add(light.flux_ratio[i] - 1.0, light.flux_sd[i]);
+      }
+      moved.Add(check.lights[7].moved_mm[i] - Eigen::Vector3d(4.0, -3.0, 5.0)[i],
+                check.lights[7].moved_sd_mm[i]);
+      camera.Add(check.camera.moved_mm[i] - Eigen::Vector3d(2.0, 1.0, 0.0)[i],
+                 check.camera.moved_sd_mm[i]);
+    }
+    camera.Add(check.camera.turned_deg, check.camera.turned_sd_deg);
+  }
+  fmt::print("errors over standard deviations: flux {:.3f}, move {:.3f}, camera {:.3f}\n",
+             flux.Ratio(), moved.Ratio(), camera.Ratio());
+  EXPECT_NEAR(flux.Ratio(), 0.95, 0.1);
+  EXPECT_NEAR(moved.Ratio(), 0.95, 0.15);
+  EXPECT_NEAR(camera.Ratio(), 0.95, 0.15);
+}
+
 TEST(LightCheck, AFewBlindPixelsSayThatTheyAreUnclear) {
   const Rig rig = CalibratedRig(LightModel::kNear, {320, 212});
   const RigCheck check = Check(See(rig, rig, 1, 19));
@@ -320,7 +317,7 @@ TEST(LightCheck, AFewBlindPixelsSayThatTheyAreUnclear) {
 TEST(LightCheck, ErrorsSayWhatToDo) {
   const Rig rig = CalibratedRig();
   const Today today = See(rig, rig, 1, 21);
-  const auto message = [&](const Rig& with, const std::vector<CheckedSheet>& sheets,
+  const auto message = [&](const Rig& with, const std::vector<SheetReadings>& sheets,
                            const LightCheckOptions& options) {
     return CheckRig(with, sheets, today.faults, options).error().message;
   };
@@ -334,7 +331,7 @@ TEST(LightCheck, ErrorsSayWhatToDo) {
   EXPECT_THAT(message(rig, today.sheets, {.albedo = 0.0}), HasSubstr("albedo = 0; need 0 <"));
   EXPECT_THAT(message(rig, today.sheets, {.max_flux_percent = 100.0}),
               HasSubstr("max_flux_percent = 100; need 0 < max_flux_percent < 100"));
-  std::vector<CheckedSheet> empty = today.sheets;
+  std::vector<SheetReadings> empty = today.sheets;
   for (std::vector<SheetSample>& samples : empty[0].samples) {
     samples.clear();
   }

@@ -57,7 +57,8 @@ struct TwoSheets {
 
   [[nodiscard]] double WorstDeg(const std::vector<std::vector<SheetSample>>& samples,
                                 const IncidentOf& incident) const {
-    const SheetView view{camera.columns, camera.rows, samples, blocks};
+    const SheetReadings view{
+        .columns = camera.columns, .rows = camera.rows, .samples = samples, .blocks = blocks};
     return FlatnessOf(view, incident).value().worst_rad / kRadPerDeg;
   }
 
@@ -79,7 +80,10 @@ struct TwoSheets {
 
 TEST(Flatness, TrueLightsSolveFlatToTheNoise) {
   const TwoSheets sheets(1.0);
-  const SheetView view{sheets.camera.columns, sheets.camera.rows, sheets.flat, sheets.blocks};
+  const SheetReadings view{.columns = sheets.camera.columns,
+                           .rows = sheets.camera.rows,
+                           .samples = sheets.flat,
+                           .blocks = sheets.blocks};
   const Flatness flat = FlatnessOf(view, sheets.truth).value();
   fmt::print("true lights: worst {:.2e} deg over {} tiles\n", flat.worst_rad / kRadPerDeg,
              flat.tiles);
@@ -104,7 +108,10 @@ TEST(Flatness, IsTheAngleThatAWrongIntensityCauses) {
 
   Lights wrong = sheets.truth;
   wrong[3].flux_rgb *= 1.02;
-  const SheetView view{sheets.camera.columns, sheets.camera.rows, sheets.flat, sheets.blocks};
+  const SheetReadings view{.columns = sheets.camera.columns,
+                           .rows = sheets.camera.rows,
+                           .samples = sheets.flat,
+                           .blocks = sheets.blocks};
   const Flatness flat = FlatnessOf(view, wrong, {.tile_mm = 1000.0}).value();
 
   EXPECT_EQ(flat.tiles, 1);
@@ -126,7 +133,10 @@ TEST(Flatness, DustDoesNotCountAndASheetUnseenIsAnError) {
             0.005);
   sheets.flat.resize(2);
   sheets.blocks.resize(2);
-  const SheetView view{sheets.camera.columns, sheets.camera.rows, sheets.flat, sheets.blocks};
+  const SheetReadings view{.columns = sheets.camera.columns,
+                           .rows = sheets.camera.rows,
+                           .samples = sheets.flat,
+                           .blocks = sheets.blocks};
   EXPECT_THAT(FlatnessOf(view, sheets.truth).error().message, HasSubstr("seen under 3 lights"));
   EXPECT_THAT(FlatnessOf(view, sheets.truth, {.tile_mm = 0.0}).error().message,
               HasSubstr("tile_mm = 0; need a number > 0"));

@@ -38,7 +38,8 @@ Seen SheetWith(const std::function<void(size_t light, SheetSample& sample)>& spo
 }
 
 std::optional<SheetFault> FaultOf(const Seen& seen) {
-  return FindSheetFault(seen.samples, seen.blocks, 64, 42, seen.lights, 0.99);
+  return FindSheetFault({.columns = 64, .rows = 42, .samples = seen.samples, .blocks = seen.blocks},
+                        seen.lights, 0.99);
 }
 
 TEST(FindSheetFault, NoiseIsNone) {

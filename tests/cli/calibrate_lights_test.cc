@@ -146,7 +146,10 @@ TEST_F(CalibrateLightsCommand, OneFlatSheetSolvesFlatAndAsksForTilts) {
   // The bar: a flat sheet that calibrated nothing then solves flat to 0.05 degrees edge to edge.
   Render("flat-again", 0, 0, 77, R"("albedo": [0.99, 0.99, 0.99])");
   const Sheet again = ReadSheet(Path("flat-again"), {.rig_file = Path("one.json")}).value();
-  const SheetView view{again.grid.columns, again.grid.rows, again.samples, again.blocks};
+  const SheetReadings view{.columns = again.grid.columns,
+                           .rows = again.grid.rows,
+                           .samples = again.samples,
+                           .blocks = again.blocks};
   const double worst_deg = FlatnessOf(view, again.rig.lights).value().worst_rad / kRadPerDeg;
   fmt::print("another flat sheet solves flat to {:.4f} degrees\n", worst_deg);
   EXPECT_LT(worst_deg, 0.05);

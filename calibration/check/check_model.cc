@@ -1,42 +1,31 @@
-#include "calibration/check/check_system.h"
+#include "calibration/check/check_model.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cmath>
-
-#include "calibration/check/check_unknowns.h"
-#include "core/parallel.h"
+#include <utility>
 
 namespace sateen {
 
-CheckSystem::Normal& CheckSystem::Normal::operator+=(const Normal& other) {
-  matrix += other.matrix;
-  gradient += other.gradient;
-  chi2 += other.chi2;
-  return *this;
+namespace {
+
+// Returns height z of equation (2) and its derivatives by u and v.
+std::array<double, 3> SheetHeightAt(const SheetHeights& h, double u, double v) {
+  return {h[0] + h[1] * u + h[2] * v + h[3] * u * u + h[4] * u * v + h[5] * v * v,
+          h[1] + 2.0 * h[3] * u + h[4] * v, h[2] + h[4] * u + 2.0 * h[5] * v};
 }
 
-CheckSystem::CheckSystem(const Rig& rig, const std::vector<CheckedSheet>& sheets, double albedo,
-                         const std::vector<bool>& used, const Task& task)
-    : rig_(rig),
-      sheets_(sheets),
-      albedo_(albedo),
-      used_(used),
-      task_{.threads = task.threads},
-      weights_(rig.lights.size()) {
-  for (const CheckedSheet& sheet : sheets) {
+}  // namespace
+
+CheckModel::CheckModel(const Rig& rig, const std::vector<SheetReadings>& sheets, double albedo)
+    : rig_(rig), sheets_(sheets), albedo_(albedo) {
+  for (const SheetReadings& sheet : sheets) {
     planes_.push_back(PlaneOf(sheet));
   }
-  (void)ParallelFor(static_cast<int>(used.size()), 1, task_, [&](int begin, int end) {
-    for (int k = begin; k < end; ++k) {
-      if (used_[static_cast<size_t>(k)]) {
-        Settle(static_cast<size_t>(k));
-      }
-    }
-  });
 }
 
-CheckSystem::Plane CheckSystem::PlaneOf(const CheckedSheet& sheet) {
+CheckModel::Plane CheckModel::PlaneOf(const SheetReadings& sheet) {
   Plane plane;
   const auto lit = std::ranges::find_if(sheet.samples, [](const auto& s) { return !s.empty(); });
   if (lit == sheet.samples.end()) {
@@ -57,22 +46,21 @@ CheckSystem::Plane CheckSystem::PlaneOf(const CheckedSheet& sheet) {
   return plane;
 }
 
-RigChange CheckSystem::Unchanged() const {
+RigChange CheckModel::Unchanged() const {
   RigChange change;
   change.lights.resize(rig_.lights.size());
   change.sheets.resize(sheets_.size(), SheetHeights::Zero());
   return change;
 }
 
-Eigen::Vector3d CheckSystem::Predict(size_t sheet, size_t light, const SheetSample& sample,
-                                     const RigChange& change) const {
+Eigen::Vector3d CheckModel::Predict(size_t sheet, size_t light, const SheetSample& sample,
+                                    const RigChange& change) const {
   return PredictUnder(ChangedLight(rig_.lights[light], change.lights[light]), sheet, sample,
                       change);
 }
 
-Eigen::Vector3d CheckSystem::PredictUnder(const Light& light, size_t sheet,
-                                          const SheetSample& sample,
-                                          const RigChange& change) const {
+Eigen::Vector3d CheckModel::PredictUnder(const Light& light, size_t sheet,
+                                         const SheetSample& sample, const RigChange& change) const {
   const Plane& plane = planes_[sheet];
   const Eigen::Vector3d eye_mm = rig_.camera->table_from_camera.translation();
   const Eigen::Vector3d was = sample.point_mm - eye_mm;
@@ -90,8 +78,8 @@ Eigen::Vector3d CheckSystem::PredictUnder(const Light& light, size_t sheet,
   return in.e_rgb * (albedo_ * std::max(0.0, normal.dot(in.l)));  // of (1)
 }
 
-std::vector<double> CheckSystem::Residuals(size_t sheet, size_t light,
-                                           const RigChange& change) const {
+std::vector<double> CheckModel::Residuals(size_t sheet, size_t light,
+                                          const RigChange& change) const {
   std::vector<double> residuals;
   for (const SheetSample& sample : sheets_[sheet].samples[light]) {
     const Eigen::Vector3d off =
@@ -101,13 +89,13 @@ std::vector<double> CheckSystem::Residuals(size_t sheet, size_t light,
   return residuals;
 }
 
-CheckSystem::Normal CheckSystem::NormalOf(size_t sheet, size_t light, const RigChange& change,
-                                          const std::vector<double>& weights,
-                                          const Wanted& wanted) const {
-  Normal normal;
+LocalNormal CheckModel::NormalOf(size_t sheet, size_t light, const RigChange& change,
+                                 const std::vector<double>& weights,
+                                 const WantedUnknowns& wanted) const {
+  LocalNormal normal;
   const std::vector<SheetSample>& samples = sheets_[sheet].samples[light];
   const Light now = ChangedLight(rig_.lights[light], change.lights[light]);
-  // One unknown a little higher and a little lower, for each that is wanted.
+  // Rig with one unknown a step higher or lower, two per unknown that is wanted.
   struct Variation {
     int local;
     RigChange change;
@@ -150,9 +138,9 @@ CheckSystem::Normal CheckSystem::NormalOf(size_t sheet, size_t light, const RigC
   return normal;
 }
 
-CheckSystem::Wanted CheckSystem::WantedOf(size_t light, bool moved, bool turned, bool camera,
-                                          bool sheet) const {
-  Wanted wanted = {};
+WantedUnknowns CheckModel::WantedOf(size_t light, bool moved, bool turned, bool camera,
+                                    bool sheet) const {
+  WantedUnknowns wanted = {};
   const bool has_axis = IsLed(rig_.lights[light].model);
   for (int local = 0; local < kLocal; ++local) {
     bool is_wanted = sheet;
@@ -170,21 +158,7 @@ CheckSystem::Wanted CheckSystem::WantedOf(size_t light, bool moved, bool turned,
   return wanted;
 }
 
-std::vector<std::vector<CheckSystem::Normal>> CheckSystem::Normals(
-    const RigChange& change, const std::vector<Wanted>& wanted) const {
-  std::vector<std::vector<Normal>> normals(used_.size());
-  (void)ParallelFor(static_cast<int>(used_.size()), 1, task_, [&](int begin, int end) {
-    for (int at = begin; at < end; ++at) {
-      const auto k = static_cast<size_t>(at);
-      for (size_t s = 0; s < sheets_.size() && used_[k]; ++s) {
-        normals[k].push_back(NormalOf(s, k, change, weights_[k][s], wanted[k]));
-      }
-    }
-  });
-  return normals;
-}
-
-CheckSystem::Lie CheckSystem::LieOf(size_t sheet, const RigChange& change) const {
+CheckModel::Lie CheckModel::LieOf(size_t sheet, const RigChange& change) const {
   constexpr int kLiePlaces = 5;  // along u and v
   const SheetHeights& h = change.sheets[sheet];
   Lie lie;
