@@ -66,10 +66,10 @@ fuzz: setup  ## libFuzzer with the address sanitizer over each target of fuzz/
 	@cmake --build --preset fuzz -j$(JOBS)
 	@for target in build/fuzz/bin/sateen_fuzz_*; do name=$${target##*sateen_fuzz_}; \
 	    mkdir -p build/fuzz/found/$$name; echo "== $$name"; \
-	    $$target -max_total_time=$(SECONDS) -max_len=400 -print_final_stats=1 \
+	    $$target -max_total_time=$(SECONDS) -print_final_stats=1 \
 	        build/fuzz/found/$$name fuzz/corpus/$$name || exit 1; done
 
-mutants: setup  ## Break the code in each way of tests/mutants; see a test fail. WORD=..., part of a name
+mutants: setup  ## Break the code in each way of tests/mutants; see a test fail. WORD=..., a list or part of a name
 	@tools/mutants -j$(JOBS) $(WORD)
 
 format: setup  ## Format all sources in place

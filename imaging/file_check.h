@@ -13,6 +13,10 @@ struct FileHead {
   uint64_t file_bytes = 0;  // length of the whole file
 };
 
+// No lossless coder in use here packs better than about 1 : 1000 but DWA, whose runs of equal
+// blocks are deflated again; a header that asks for more than this is wrong.
+inline constexpr uint64_t kMaxCompression = 1 << 14;
+
 // Errors   kIo: the file is absent, a folder or unreadable
 //          kBadData: it is empty
 [[nodiscard]] Result<FileHead> ReadFileHead(const std::filesystem::path& path);

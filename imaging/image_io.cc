@@ -18,9 +18,6 @@ namespace sateen {
 namespace {
 
 constexpr int64_t kMaxPixels = int64_t{1} << 31;
-// No lossless coder in use here packs better than about 1 : 1000 but DWA, whose runs of equal
-// blocks are deflated again; a header that asks for more than this is wrong.
-constexpr uint64_t kMaxCompression = 1 << 14;
 
 // A decoded file: fractions of full scale for integers, after the transfer function if asked.
 struct Decoded {

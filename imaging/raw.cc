@@ -40,6 +40,19 @@ Status CheckDecoded(const std::filesystem::path& path, LibRaw& raw, int open_or_
               LibRaw::version());
 }
 
+// Before room is made for the samples.
+Status CheckFits(const std::filesystem::path& path, const libraw_image_sizes_t& sizes,
+                 uint64_t file_bytes) {
+  const uint64_t bytes = uint64_t{sizes.raw_width} * sizes.raw_height * sizeof(uint16_t);
+  if (bytes / kMaxCompression > file_bytes) {
+    return Fail(ErrorCode::kBadData,
+                "{}: its header says {} x {} sites, which {} bytes cannot hold; the file is "
+                "damaged or cut short",
+                path.string(), sizes.raw_width, sizes.raw_height, file_bytes);
+  }
+  return {};
+}
+
 // What keeps the file from being one integer sample a site under a 2x2 red, green, blue pattern;
 // empty if nothing does.
 std::string_view NotBayer(LibRaw& raw) {
@@ -182,6 +195,9 @@ Status DecodeUnguarded(const std::filesystem::path& path, const TakeDecoded& tak
   raw->set_dataerror_handler(nullptr, nullptr);                    // it would print to stderr
   int status = raw->open_file(path.string().c_str());
   if (status == LIBRAW_SUCCESS) {
+    if (Status fits = CheckFits(path, raw->imgdata.sizes, head->file_bytes); !fits) {
+      return fits;
+    }
     status = raw->unpack();
   }
   if (Status decoded = CheckDecoded(path, *raw, status); !decoded) {

@@ -6,8 +6,9 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
-#include <nlohmann/json.hpp>
 #include <string>
+
+#include "core/json.h"
 
 namespace sateen {
 namespace {
@@ -101,8 +102,8 @@ Result<nlohmann::json> ReceiveMessage(int socket, std::optional<milliseconds> lo
   if (Status received = ReceiveAll(socket, text.data(), text.size(), deadline); !received) {
     return tl::unexpected(received.error());
   }
-  nlohmann::json message = nlohmann::json::parse(text, nullptr, /*allow_exceptions=*/false);
-  if (size > kLongestMessage || !message.is_object()) {
+  Result<nlohmann::json> message = ParseJson(text, "message");  // not nested without end
+  if (size > kLongestMessage || !message || !message->is_object()) {
     return Fail(ErrorCode::kDevice, "the process that talks to the camera sent no message");
   }
   return message;

@@ -85,6 +85,17 @@ TEST(ProgressBar, DrawsOnATerminalAndClearsItsLine) {
   EXPECT_THAT(text, EndsWith("\r" + std::string(longest, ' ') + "\r"));
 }
 
+TEST(ProgressBar, ShowsTheShareThatIsDone) {
+  Terminal terminal;
+  {
+    ProgressBar bar(terminal.Fd());
+    bar.BeginStage("solving", 4);
+    bar.Advance(1);
+  }
+  // A quarter of the 30 places of the bar.
+  EXPECT_THAT(terminal.Text(), HasSubstr(" [#######" + std::string(23, ' ') + "]  25 %"));
+}
+
 TEST(ProgressBar, LinesAreOfOneWidthWhateverTheNameAndTheSteps) {
   Terminal terminal;
   {

@@ -140,6 +140,19 @@ TEST(ReadRawMosaic, RefusesBlackThatIsNotBelowWhite) {
   ExpectBad(ReadDng(spec), "black level 4000 is not below its white level 4000");
 }
 
+TEST(ReadRawMosaic, RefusesSizesThatTheFileCannotHold) {
+  const TempFolder folder;
+  std::string bytes = DngBytes({});
+  for (const char tag : {'\x00', '\x01'}) {  // width and height: tags 256 and 257, one LONG each
+    const size_t entry = bytes.find(std::string({tag, 1, 4, 0, 1, 0, 0, 0}));
+    ASSERT_NE(entry, std::string::npos);
+    bytes.replace(entry + 8, 4, std::string("\x60\xEA\0\0", 4));
+  }
+  WriteText(folder.Path() / "a.dng", bytes);
+
+  ExpectBad(ReadRawMosaic(folder.Path() / "a.dng"), "its header says 60000 x 60000 sites");
+}
+
 TEST(ReadRawMosaic, TellsAbsentFromBad) {
   const TempFolder folder;
   const Result<RawMosaic> absent = ReadRawMosaic(folder.Path() / "absent.dng");

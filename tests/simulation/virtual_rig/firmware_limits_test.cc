@@ -187,6 +187,15 @@ TEST_F(FirmwareLimits, AllGoesOffWhenTheHostHasBeenSilentForTwoSeconds) {
   EXPECT_EQ(fault->lit, 1 << 4);
 }
 
+TEST_F(FirmwareLimits, SilenceDisarmsWhereNothingElseIsOn) {
+  talk_->Do(SateenArm{.channel = 4, .level_permille = 1000, .on_ms = 1000});
+  board_->RunFor(milliseconds(2100));
+
+  board_->FlashSync(true);
+  board_->RunFor(milliseconds(10));
+  EXPECT_EQ(board_->Records()[4].times_on, 0);
+}
+
 TEST_F(FirmwareLimits, SilenceDisarmsAndOpensTheShutter) {
   talk_->Do(SateenArm{.channel = 4, .level_permille = 1000, .on_ms = 1000});
   talk_->Do(SateenTriggerShutter{.press_ms = 10'000});
