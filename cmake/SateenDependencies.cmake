@@ -25,6 +25,7 @@ macro(sateen_find_pkg_config prefix module)
   endif()
 endmacro()
 
+sateen_find_package(Boost 1.74)
 sateen_find_package(Eigen3 3.4 NO_MODULE)
 sateen_find_package(fmt 9)
 sateen_find_package(tl-expected 1.0)

@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "core/check.h"
+#include "core/option_range.h"
 #include "core/output_folder.h"
 
 namespace sateen {
@@ -21,13 +22,6 @@ namespace {
 constexpr uint16_t kD65 = 21;  // EXIF LightSource
 
 // ---- Header --------------------------------------------------------------------------------------
-
-Status CheckRange(const char* name, double value, double least, double most) {
-  if (!(value >= least && value <= most)) {  // so that NaN fails too
-    return Fail(ErrorCode::kInvalidArgument, "{} = {}; need {} to {}", name, value, least, most);
-  }
-  return {};
-}
 
 Status CheckWhole(const char* name, double value, double least, double most) {
   if (!(value >= least && value <= most) || value != std::floor(value)) {

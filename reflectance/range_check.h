@@ -4,18 +4,11 @@
 #include <string_view>
 
 #include "core/error.h"
+#include "core/option_range.h"
 
 namespace sateen {
 
-// kInvalidArgument names the field, its value and its range; NaN is out of every range.
-inline Status CheckRange(std::string_view field, double value, double least, double most) {
-  if (!(value >= least && value <= most)) {
-    return Fail(ErrorCode::kInvalidArgument, "{} = {:g}; need {:g} to {:g}", field, value, least,
-                most);
-  }
-  return {};
-}
-
+// Fails as CheckRange does unless each component is within 0 to 1.
 inline Status CheckColour(std::string_view field, const Eigen::Vector3d& colour) {
   for (const double value : colour) {
     if (Status status = CheckRange(field, value, 0.0, 1.0); !status) {

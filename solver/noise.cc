@@ -54,7 +54,7 @@ float QuantileOf(std::vector<float>& values, double share) {
   return *place;
 }
 
-double ChiSquaredQuantile(double share, int freedom) {
+double ReducedChiSquaredQuantile(double share, int freedom) {
   if (freedom == 1) {
     return std::pow(NormalQuantile(0.5 * (1.0 + share)), 2.0);
   }

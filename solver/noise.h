@@ -41,6 +41,6 @@ inline constexpr float kLeastCosine = 0.02F;
 
 // The `share` quantile of chi^2 over its degrees of freedom: of one and two in closed form, beyond
 // by Wilson and Hilferty's cube root, within 7 % for shares of 0.05 and more.
-[[nodiscard]] double ChiSquaredQuantile(double share, int freedom);
+[[nodiscard]] double ReducedChiSquaredQuantile(double share, int freedom);
 
 }  // namespace sateen

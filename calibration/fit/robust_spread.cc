@@ -7,15 +7,8 @@ namespace sateen {
 namespace {
 
 constexpr double kOutlierScale = 4.0;  // times the residuals' spread
-constexpr double kNormalMad = 1.4826;  // standard deviation over median size, normal distribution
 
 }  // namespace
-
-double Median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 double Rms(const std::vector<double>& values) {
   double sum = 0.0;
@@ -28,7 +21,7 @@ double Rms(const std::vector<double>& values) {
 double SpreadOf(const std::vector<double>& residuals) {
   std::vector<double> sizes(residuals.size());
   std::ranges::transform(residuals, sizes.begin(), [](double r) { return std::abs(r); });
-  return std::max(kNormalMad * Median(std::move(sizes)), 1e-12);
+  return std::max(kSdPerMad * Median(std::move(sizes)), 1e-12);
 }
 
 std::vector<size_t> OnModel(const std::vector<size_t>& indices,

@@ -3,6 +3,8 @@
 #include <cstddef>
 #include <vector>
 
+#include "core/statistics.h"
+
 namespace sateen {
 
 /// Returns the standard deviation of residuals about zero, from the median of their sizes,
@@ -16,8 +18,5 @@ namespace sateen {
 
 /// Returns the root mean square; 0 of no values.
 [[nodiscard]] double Rms(const std::vector<double>& values);
-
-/// Returns the median, the upper of two middle values. `values` is not empty.
-[[nodiscard]] double Median(std::vector<double> values);
 
 }  // namespace sateen

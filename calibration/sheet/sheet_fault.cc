@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/statistics.h"
+
 namespace sateen {
 namespace {
 
@@ -15,14 +17,6 @@ constexpr double kLongOfSheet = 0.4;    // length of a line over the sheet's sho
 constexpr double kRimBlocks = 0.08;     // of the grid's columns and rows
 constexpr double kMostlyRim = 0.6;
 constexpr double kInner = 0.05;  // share cut off at either end of what is measured
-constexpr double kMadOfNormal = 1.4826;
-
-double Quantile(std::vector<double> values, double share) {
-  const auto at =
-      values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), at, values.end());
-  return *at;
-}
 
 // How far each sample is off the light, in robust standard deviations; the worst of its colours.
 std::vector<double> OffsetsOf(const std::vector<SheetSample>& samples, const Light& light,
@@ -41,7 +35,7 @@ std::vector<double> OffsetsOf(const std::vector<SheetSample>& samples, const Lig
   if (sizes.empty()) {
     return {};
   }
-  const double spread = std::max(kMadOfNormal * Quantile(std::move(sizes), 0.5), 1e-12);
+  const double spread = std::max(kSdPerMad * Quantile(std::move(sizes), 0.5), 1e-12);
   std::vector<double> worst;
   worst.reserve(off.size());
   for (const Eigen::Array3d& one : off) {

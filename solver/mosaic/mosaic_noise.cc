@@ -83,7 +83,7 @@ double GainOf(std::vector<float>& values, double share, int freedom) {
   if (values.empty()) {
     return std::numeric_limits<double>::infinity();
   }
-  return static_cast<double>(QuantileOf(values, share)) / ChiSquaredQuantile(share, freedom);
+  return static_cast<double>(QuantileOf(values, share)) / ReducedChiSquaredQuantile(share, freedom);
 }
 
 // (1)

@@ -191,7 +191,8 @@ double ScaleSquaredOf(const LightStack& stack, const MisfitSample& sample, bool 
       }
     }
     const double share = known ? kShareOfKnown : kShareOfUnknown;
-    scale = static_cast<double>(QuantileOf(misfits, share)) / ChiSquaredQuantile(share, usual - 3);
+    scale = static_cast<double>(QuantileOf(misfits, share)) /
+            ReducedChiSquaredQuantile(share, usual - 3);
   }
   if (known) {
     return std::clamp(scale, kLeastScaleSquared, 1.0);

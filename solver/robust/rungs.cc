@@ -57,8 +57,9 @@ std::array<float, 256> MisfitLimits(double scale_squared, double false_alarms) {
   std::array<float, 256> limits;
   limits.fill(std::numeric_limits<float>::infinity());
   for (size_t usable = 4; usable < limits.size(); ++usable) {
-    limits[usable] = static_cast<float>(
-        scale_squared * ChiSquaredQuantile(1.0 - false_alarms, static_cast<int>(usable) - 3));
+    limits[usable] =
+        static_cast<float>(scale_squared * ReducedChiSquaredQuantile(1.0 - false_alarms,
+                                                                     static_cast<int>(usable) - 3));
   }
   return limits;
 }

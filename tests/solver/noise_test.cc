@@ -11,17 +11,17 @@ using testing::TwoRings;
 
 TEST(SolveLadder, ChiSquaredQuantiles) {
   // Tables: 95 % of 7 degrees of freedom 14.067, 25 % 4.255, 99.9 % 24.322; 5 % of 93 71.76.
-  EXPECT_NEAR(ChiSquaredQuantile(0.95, 7) * 7.0, 14.067, 0.05);
-  EXPECT_NEAR(ChiSquaredQuantile(0.25, 7) * 7.0, 4.255, 0.05);
-  EXPECT_NEAR(ChiSquaredQuantile(0.999, 7) * 7.0, 24.322, 0.25);
-  EXPECT_NEAR(ChiSquaredQuantile(0.05, 93) * 93.0, 71.76, 0.2);
-  EXPECT_NEAR(ChiSquaredQuantile(0.05, 1), 0.00393, 1e-5);
-  EXPECT_NEAR(ChiSquaredQuantile(0.999, 1), 10.828, 1e-3);
-  EXPECT_NEAR(ChiSquaredQuantile(0.05, 2) * 2.0, 0.10259, 1e-5);
-  EXPECT_NEAR(ChiSquaredQuantile(0.999, 2) * 2.0, 13.816, 1e-3);
+  EXPECT_NEAR(ReducedChiSquaredQuantile(0.95, 7) * 7.0, 14.067, 0.05);
+  EXPECT_NEAR(ReducedChiSquaredQuantile(0.25, 7) * 7.0, 4.255, 0.05);
+  EXPECT_NEAR(ReducedChiSquaredQuantile(0.999, 7) * 7.0, 24.322, 0.25);
+  EXPECT_NEAR(ReducedChiSquaredQuantile(0.05, 93) * 93.0, 71.76, 0.2);
+  EXPECT_NEAR(ReducedChiSquaredQuantile(0.05, 1), 0.00393, 1e-5);
+  EXPECT_NEAR(ReducedChiSquaredQuantile(0.999, 1), 10.828, 1e-3);
+  EXPECT_NEAR(ReducedChiSquaredQuantile(0.05, 2) * 2.0, 0.10259, 1e-5);
+  EXPECT_NEAR(ReducedChiSquaredQuantile(0.999, 2) * 2.0, 13.816, 1e-3);
   // The cube root is at its worst.
-  EXPECT_NEAR(ChiSquaredQuantile(0.05, 3) * 3.0, 0.35185, 0.07 * 0.35185);
-  EXPECT_NEAR(ChiSquaredQuantile(0.999, 3) * 3.0, 16.266, 0.02 * 16.266);
+  EXPECT_NEAR(ReducedChiSquaredQuantile(0.05, 3) * 3.0, 0.35185, 0.07 * 0.35185);
+  EXPECT_NEAR(ReducedChiSquaredQuantile(0.999, 3) * 3.0, 16.266, 0.02 * 16.266);
 }
 
 TEST(NoiseOf, TakesGainAndWhiteBalanceFromTheRig) {
