@@ -49,9 +49,9 @@ endif()
 
 # What the programs use and the libraries do not.
 if(NOT "${CMAKE_FIND_PACKAGE_NAME}" STREQUAL "sateen")
+  find_package(Boost 1.74 REQUIRED)  # headers alone
   find_package(CLI11 2.1 REQUIRED)
   sateen_find_pkg_config(libgphoto2 libgphoto2>=2.5.28)
-  sateen_find_pkg_config(CppHttplib cpp-httplib>=0.11)
 endif()
 
 # For the virtual rig alone, because it is GPL-3. Not by pkg-config: Debian's file wants libelf-dev.

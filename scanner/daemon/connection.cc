@@ -73,48 +73,36 @@ bool Connection::WaitFor(short what, milliseconds longest) const {
   return ready > 0;
 }
 
-bool Connection::is_readable() const { return begin_ < end_ || WaitFor(POLLIN, milliseconds(0)); }
-
-bool Connection::is_writable() const {
+bool Connection::IsOpen() const {
   pollfd entry = {.fd = fd_, .events = POLLRDHUP};
   return poll(&entry, 1, 0) == 0 || (entry.revents & (POLLRDHUP | POLLHUP | POLLERR)) == 0;
 }
 
-ssize_t Connection::read(char* into, size_t size) {
-  if (begin_ == end_) {
-    const auto left = std::chrono::duration_cast<milliseconds>(deadline_ - steady_clock::now());
-    if (bytes_read_ >= limits_.request_bytes || left.count() <= 0 || !WaitFor(POLLIN, left)) {
-      return -1;
-    }
-    const std::size_t most = std::min(buffer_.size(), limits_.request_bytes - bytes_read_);
-    const ssize_t count = recv(fd_, buffer_.data(), most, 0);
+bool Connection::Read(std::string& into) {
+  const auto left = std::chrono::duration_cast<milliseconds>(deadline_ - steady_clock::now());
+  if (bytes_read_ >= limits_.request_bytes || left.count() <= 0 || !WaitFor(POLLIN, left)) {
+    return false;
+  }
+  const std::size_t most = std::min(buffer_.size(), limits_.request_bytes - bytes_read_);
+  const ssize_t count = recv(fd_, buffer_.data(), most, 0);
+  if (count <= 0) {
+    return false;
+  }
+  bytes_read_ += static_cast<std::size_t>(count);
+  into.append(buffer_.data(), static_cast<std::size_t>(count));
+  return true;
+}
+
+bool Connection::Write(std::string_view bytes) {
+  while (!bytes.empty()) {
+    const ssize_t count =
+        WaitFor(POLLOUT, limits_.write) ? send(fd_, bytes.data(), bytes.size(), MSG_NOSIGNAL) : -1;
     if (count <= 0) {
-      return count;
+      return false;
     }
-    begin_ = 0;
-    end_ = static_cast<std::size_t>(count);
-    bytes_read_ += end_;
+    bytes.remove_prefix(static_cast<std::size_t>(count));
   }
-  const std::size_t count = std::min(size, end_ - begin_);
-  std::copy_n(buffer_.data() + begin_, count, into);
-  begin_ += count;
-  return static_cast<ssize_t>(count);
-}
-
-ssize_t Connection::write(const char* from, size_t size) {
-  if (!WaitFor(POLLOUT, limits_.write)) {
-    return -1;
-  }
-  return send(fd_, from, size, MSG_NOSIGNAL);
-}
-
-void Connection::get_remote_ip_and_port(std::string& ip, int& port) const {
-  ip = "local";  // PeerName() has the words; headers made of this are not used
-  port = 0;
-}
-
-void Connection::get_local_ip_and_port(std::string& ip, int& port) const {
-  get_remote_ip_and_port(ip, port);
+  return true;
 }
 
 std::string Connection::PeerName() const {

@@ -2,11 +2,10 @@
 
 #include <array>
 #include <chrono>
+#include <cstddef>
 #include <string>
+#include <string_view>
 
-#include "scanner/daemon/httplib.h"
-
-// One accepted connection as cpp-httplib's parser reads and writes it. For .cc files only.
 namespace sateen {
 
 struct ConnectionLimits {
@@ -18,24 +17,22 @@ struct ConnectionLimits {
   std::size_t request_bytes = std::size_t{128} * 1024;
 };
 
-class Connection : public httplib::Stream {
+/// One accepted connection, with a deadline and a limit for what is read of it.
+class Connection {
  public:
-  // The descriptor does not block; it is the caller's, to be closed after this.
+  // Borrows the descriptor, which must not block; the caller closes it afterwards.
   Connection(int fd, const ConnectionLimits& limits);
   Connection(const Connection&) = delete;
   Connection& operator=(const Connection&) = delete;
-  // Ends it so that the client can read the answer: what it still sends is read first, for a moment.
-  ~Connection() override;
+  // Ends the connection so that the client can read the answer: reads what it still sends, for a moment.
+  ~Connection();
 
-  bool is_readable() const override;
-  // Whether the client is still there.
-  bool is_writable() const override;
-  ssize_t read(char* into, size_t size) override;
-  ssize_t write(const char* from, size_t size) override;
-  using Stream::write;
-  void get_remote_ip_and_port(std::string& ip, int& port) const override;
-  void get_local_ip_and_port(std::string& ip, int& port) const override;
-  socket_t socket() const override { return fd_; }
+  // Appends the next bytes to `into`. Returns false at the end, the deadline or the limit.
+  [[nodiscard]] bool Read(std::string& into);
+  // Writes everything. Returns false where the client is gone or takes nothing for too long.
+  [[nodiscard]] bool Write(std::string_view bytes);
+  // Returns whether the client is still there.
+  [[nodiscard]] bool IsOpen() const;
 
   // "process 4711 (sateen) of alice" on a Unix socket, "127.0.0.1 port 51234" on TCP.
   [[nodiscard]] std::string PeerName() const;
@@ -49,8 +46,6 @@ class Connection : public httplib::Stream {
   const std::chrono::steady_clock::time_point deadline_;
   std::size_t bytes_read_ = 0;
   std::array<char, 4096> buffer_ = {};
-  std::size_t begin_ = 0;
-  std::size_t end_ = 0;
 };
 
 }  // namespace sateen

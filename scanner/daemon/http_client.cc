@@ -1,14 +1,8 @@
 #include "scanner/daemon/http_client.h"
 
-#include <sys/socket.h>
-#include <sys/un.h>
-#include <unistd.h>
-
 #include <atomic>
-#include <cerrno>
 #include <chrono>
 #include <cstdlib>
-#include <cstring>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -16,8 +10,9 @@
 #include "scanner/daemon/answer_json.h"
 #include "scanner/daemon/api_json.h"
 #include "scanner/daemon/event_parser.h"
-#include "scanner/daemon/httplib.h"
+#include "scanner/daemon/http_message.h"
 #include "scanner/daemon/listener.h"
+#include "scanner/daemon/unix_exchange.h"
 
 namespace sateen {
 namespace {
@@ -36,64 +31,31 @@ constexpr milliseconds kStep{20};
 // How often a stream that breaks off is taken up again without having brought anything new.
 constexpr int kResumes = 5;
 
-// cpp-httplib's client on a Unix socket.
-struct UnixClient : httplib::ClientImpl {
-  UnixClient(const std::filesystem::path& socket, seconds patience)
-      : ClientImpl(socket.string(), /*port=*/80) {
-    set_address_family(AF_UNIX);
-    set_connection_timeout(kGreeting);
-    set_read_timeout(patience);
-    set_write_timeout(patience);
-  }
-};
-
-// Whether somebody accepts connections there, and lets this user in.
-bool Accepts(const std::filesystem::path& path) {
-  sockaddr_un address = {.sun_family = AF_UNIX};
-  if (path.native().size() >= sizeof address.sun_path) {
-    return false;
-  }
-  std::memcpy(address.sun_path, path.c_str(), path.native().size() + 1);
-  // Without waiting: EAGAIN is a daemon that is there and has not come to this one yet.
-  const int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-  const bool connected =
-      fd >= 0 &&
-      (connect(fd, static_cast<sockaddr*>(static_cast<void*>(&address)), sizeof address) == 0 ||
-       errno == EAGAIN);
-  if (fd >= 0) {
-    close(fd);
-  }
-  return connected;
-}
-
-// A daemon that dies while it is asked breaks off its answer, as one that is slow does: who accepts
-// nobody any more is gone.
-Error NoAnswer(const std::filesystem::path& socket, httplib::Error error) {
-  const bool slow = error == httplib::Error::Read && Accepts(socket);
+// Distinguishes a daemon that is slow from one that has died: one that has died accepts nobody any more.
+Error NoAnswer(const std::filesystem::path& socket, const ExchangeFault& fault) {
+  const bool slow = fault.while_reading && Accepts(socket);
   return {slow ? ErrorCode::kTimeout : ErrorCode::kDevice,
           fmt::format("the daemon at {} {}: {}; start it again, or end it to work without one",
-                      socket.string(), slow ? "does not answer" : "is gone",
-                      httplib::to_string(error))};
+                      socket.string(), slow ? "does not answer" : "is gone", fault.why)};
 }
 
 Result<std::string> AskWithin(const std::filesystem::path& socket, seconds patience,
                               const std::string& method, const std::string& path,
                               const std::string& body) {
-  UnixClient http(socket, patience);
-  httplib::Request request;
-  request.method = method;
-  request.path = path;
-  request.headers = {{"Host", "localhost"}};
+  std::vector<HttpField> fields = {{"Host", "localhost"}};
   if (method != "GET") {
-    request.headers.emplace("Content-Type", "application/json");
-    request.body = body;
+    fields.emplace_back("Content-Type", "application/json");
   }
-  const httplib::Result answer = http.send(request);
-  if (!answer) {
-    return tl::unexpected(NoAnswer(socket, answer.error()));
+  std::string answer;
+  const auto status =
+      ExchangeOnUnixSocket(socket, RequestText(method, path, fields, body),
+                           {.connecting = kGreeting, .silence = patience},
+                           [&](int /*status*/, std::string_view piece) { answer += piece; });
+  if (!status) {
+    return tl::unexpected(NoAnswer(socket, status.error()));
   }
-  return answer->status < 300 ? Result<std::string>(answer->body)
-                              : tl::unexpected(ErrorFromJson(answer->body));
+  return *status < 300 ? Result<std::string>(std::move(answer))
+                       : tl::unexpected(ErrorFromJson(answer));
 }
 
 // Follows a job to its end, in a thread of its own, so that a cancelled task is heard meanwhile.
@@ -135,38 +97,34 @@ class Follower {
     ended_ = true;
   }
 
-  // False where the daemon refuses, or nobody is there any more.
+  // Returns false where the daemon refuses, or nobody is there any more.
   bool FollowOnce() {
-    UnixClient http(socket_, kSilence);
-    const httplib::Headers headers = {{"Host", "localhost"},
-                                      {"Last-Event-ID", std::to_string(last_event_)}};
+    const std::vector<HttpField> fields = {{"Host", "localhost"},
+                                           {"Last-Event-ID", std::to_string(last_event_)}};
     EventParser parser([this](const JobEvent& event) { Take(event); });
-    int status = 0;
+    bool followed = false;
     std::string refusal;
-    const httplib::Result answer = http.Get(
-        fmt::format("/v1/jobs/{}/events", job_), headers,
-        [&](const httplib::Response& response) {
-          status = response.status;
-          return true;
-        },
-        [&](const char* data, std::size_t size) {
-          if (status == 200) {
-            parser.Add({data, size});
+    const auto status = ExchangeOnUnixSocket(
+        socket_, RequestText("GET", fmt::format("/v1/jobs/{}/events", job_), fields, ""),
+        {.connecting = kGreeting, .silence = kSilence}, [&](int code, std::string_view piece) {
+          followed = code == 200;
+          if (followed) {
+            parser.Add(piece);
           } else {
-            refusal.append(data, size);
+            refusal += piece;
           }
-          return true;
         });
     if (complete_) {
       return true;
     }
-    if (status != 0 && status != 200) {
+    if (status && *status != 200) {
       outcome_ = tl::unexpected(ErrorFromJson(refusal));
       return false;
     }
-    outcome_ =
-        tl::unexpected(NoAnswer(socket_, answer ? httplib::Error::Connection : answer.error()));
-    return status == 200;  // broken off: to be taken up again
+    outcome_ = tl::unexpected(
+        NoAnswer(socket_, status ? ExchangeFault{.why = "its events ended before the job"}
+                                 : status.error()));
+    return followed;  // broken off: to be taken up again
   }
 
   const std::filesystem::path socket_;

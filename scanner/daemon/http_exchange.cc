@@ -1,22 +1,19 @@
 #include "scanner/daemon/http_exchange.h"
 
-#include <algorithm>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
 #include <charconv>
-#include <memory>
+#include <chrono>
 #include <utility>
 #include <vector>
 
 namespace sateen {
 namespace {
 
+constexpr std::size_t kMaxHead = 65'536;  // bytes
+constexpr std::size_t kMaxTarget = 8192;  // bytes
 constexpr const char* kJson = "application/json";
-
-std::vector<std::string> AllOf(const httplib::Request& request, const char* key) {
-  std::vector<std::string> values;
-  const auto [begin, end] = request.headers.equal_range(key);
-  std::transform(begin, end, std::back_inserter(values), [](const auto& h) { return h.second; });
-  return values;
-}
 
 template <typename T>
 std::optional<T> Digits(const std::string& text) {
@@ -35,19 +32,6 @@ std::string EventText(const JobEvent& event) {
   return fmt::format("id: {}\nevent: {}\ndata: {}\n\n", event.sequence, event.type, event.data);
 }
 
-// What the parser refuses by itself has no body yet.
-httplib::Server::HandlerResponse FillRefusal(const httplib::Request& /*request*/,
-                                             httplib::Response& response) {
-  if (!response.body.empty()) {
-    return httplib::Server::HandlerResponse::Unhandled;
-  }
-  const ApiResponse refused = RefusedBody(
-      response.status,
-      "this is no HTTP/1.1 request that the daemon understands; docs/api.md shows some");
-  response.set_content(refused.body + "\n", kJson);
-  return httplib::Server::HandlerResponse::Handled;
-}
-
 // Counts a stream for as long as it lives.
 class StreamSlot {
  public:
@@ -63,29 +47,48 @@ class StreamSlot {
 }  // namespace
 
 HttpExchange::HttpExchange(Connection& connection, const ExchangeContext& context)
-    : connection_(connection), context_(context) {
-  svr_sock_ = connection.socket();  // or its streams end at once
-  set_pre_routing_handler([this](const httplib::Request& request, httplib::Response& response) {
-    Send(Answer(request), response);
-    return HandlerResponse::Handled;
-  });
-  set_error_handler(HandlerWithResponse(FillRefusal));
+    : connection_(connection), context_(context) {}
+
+std::optional<std::string> HttpExchange::ReadHead() {
+  std::string bytes;
+  std::optional<std::size_t> size;
+  while (!(size = HeadSize(bytes)) && bytes.size() < kMaxHead) {
+    if (!connection_.Read(bytes)) {
+      return std::nullopt;
+    }
+  }
+  if (!size) {
+    Send(RefusedBody(400, fmt::format("the head has more than {} bytes", kMaxHead)));
+    return std::nullopt;
+  }
+  unread_ = bytes.substr(*size);
+  bytes.resize(*size);
+  return bytes;
 }
 
 void HttpExchange::Run() {
-  bool closed = false;
-  process_request(connection_, /*close_connection=*/true, closed, [](httplib::Request& request) {
-    // cpp-httplib would cut or compress answers as these ask.
-    request.ranges.clear();
-    request.headers.erase("Accept-Encoding");
-  });
+  const std::optional<std::string> head = ReadHead();
+  if (!head) {
+    return;
+  }
+  const Result<HttpRequest> request = ParseRequest(*head);
+  if (!request) {
+    Send(RefusedBody(400, "this is not an HTTP/1.1 request; docs/api.md has examples"));
+    return;
+  }
+  head_only_ = request->method == "HEAD";
+  Send(Answer(*request));
 }
 
-ApiResponse HttpExchange::Answer(const httplib::Request& request) {
+ApiResponse HttpExchange::Answer(const HttpRequest& request) {
+  if (request.path.size() > kMaxTarget) {
+    return RefusedBody(414, fmt::format("the path has {} bytes; need at most {}",
+                                        request.path.size(), kMaxTarget));
+  }
   if (context_.access) {
-    const AccessHeaders headers = {.host = AllOf(request, "Host"),
-                                   .authorization = AllOf(request, "Authorization"),
-                                   .has_origin = request.has_header("Origin")};
+    const AccessHeaders headers = {.host = request.AllOf("Host"),
+                                   .authorization = request.AllOf("Authorization"),
+                                   .has_origin = request.FirstOf("Origin").has_value()};
     if (std::optional<ApiResponse> refused = context_.access->Check(headers)) {
       return *std::move(refused);
     }
@@ -98,22 +101,22 @@ ApiResponse HttpExchange::Answer(const httplib::Request& request) {
                       .path = request.path,
                       .body = *std::move(body),
                       .who = connection_.PeerName()};
-  if (request.has_header("Last-Event-ID")) {
-    asked.last_event_id = Digits<std::uint64_t>(request.get_header_value("Last-Event-ID"));
+  if (const std::optional<std::string> last = request.FirstOf("Last-Event-ID")) {
+    asked.last_event_id = Digits<std::uint64_t>(*last);
     if (!asked.last_event_id) {
-      return RefusedBody(400, fmt::format("Last-Event-ID is '{}'; need the number of an event",
-                                          request.get_header_value("Last-Event-ID")));
+      return RefusedBody(400,
+                         fmt::format("Last-Event-ID is '{}'; need the number of an event", *last));
     }
   }
   return context_.api.Handle(asked);
 }
 
-tl::expected<std::string, ApiResponse> HttpExchange::ReadBody(const httplib::Request& request) {
+tl::expected<std::string, ApiResponse> HttpExchange::ReadBody(const HttpRequest& request) {
   const auto refuse = [](int status, std::string message) {
     return tl::unexpected<ApiResponse>(RefusedBody(status, std::move(message)));
   };
-  const std::vector<std::string> lengths = AllOf(request, "Content-Length");
-  if (request.has_header("Transfer-Encoding") || request.has_header("Content-Encoding")) {
+  const std::vector<std::string> lengths = request.AllOf("Content-Length");
+  if (request.FirstOf("Transfer-Encoding") || request.FirstOf("Content-Encoding")) {
     return refuse(411, "the body is encoded; need it as it is, with a Content-Length");
   }
   if (lengths.empty()) {
@@ -129,67 +132,70 @@ tl::expected<std::string, ApiResponse> HttpExchange::ReadBody(const httplib::Req
     return refuse(413, fmt::format("the body has {} bytes; need at most {}", *length,
                                    context_.options.max_body_bytes));
   }
-  if (*length > 0 && !request.get_header_value("Content-Type").starts_with(kJson)) {
-    return refuse(415, fmt::format("Content-Type is '{}'; need {}",
-                                   request.get_header_value("Content-Type"), kJson));
+  const std::string type = request.FirstOf("Content-Type").value_or("");
+  if (*length > 0 && !type.starts_with(kJson)) {
+    return refuse(415, fmt::format("Content-Type is '{}'; need {}", type, kJson));
   }
-  std::string body(*length, '\0');
-  for (std::size_t got = 0; got < body.size();) {
-    const ssize_t count = connection_.read(body.data() + got, body.size() - got);
-    if (count <= 0) {
-      return refuse(408, fmt::format("{} of {} bytes of the body came in time", got, body.size()));
+  if (request.FirstOf("Expect") == "100-continue" && unread_.empty() &&
+      !connection_.Write("HTTP/1.1 100 Continue\r\n\r\n")) {
+    return refuse(408, "the client is gone");
+  }
+  std::string body = std::move(unread_);
+  while (body.size() < *length) {
+    if (!connection_.Read(body)) {
+      return refuse(408,
+                    fmt::format("{} of {} bytes of the body came in time", body.size(), *length));
     }
-    got += static_cast<std::size_t>(count);
   }
+  body.resize(*length);
   return body;
 }
 
-void HttpExchange::Send(const ApiResponse& answer, httplib::Response& response) {
-  response.status = answer.status;
-  response.set_header("Cache-Control", "no-store");
-  response.set_header("X-Content-Type-Options", "nosniff");
+void HttpExchange::Send(const ApiResponse& answer) {
+  if (answer.events && context_.streams >= context_.options.max_streams) {
+    Send(Refused(503,
+                 {ErrorCode::kDevice, "too many clients follow events; wait until one has ended"}));
+    return;
+  }
+  std::vector<HttpField> fields = {{"Cache-Control", "no-store"},
+                                   {"X-Content-Type-Options", "nosniff"}};
   if (!answer.allow.empty()) {
-    response.set_header("Allow", answer.allow);
+    fields.emplace_back("Allow", answer.allow);
   }
   if (answer.status == 401) {
-    response.set_header("WWW-Authenticate", "Bearer");
+    fields.emplace_back("WWW-Authenticate", "Bearer");
   }
-  if (!answer.events) {
-    response.set_content(answer.content_type == kJson ? answer.body + "\n" : answer.body,
-                         answer.content_type);
+  if (answer.events) {
+    fields.emplace_back("Content-Type", "text/event-stream");
+    if (connection_.Write(ResponseHead(answer.status, fields, std::nullopt)) && !head_only_) {
+      SendEvents(*answer.events);
+    }
     return;
   }
-  if (context_.streams >= context_.options.max_streams) {
-    const ApiResponse refused = Refused(
-        503, {ErrorCode::kDevice, "too many clients follow events; wait until one has ended"});
-    response.status = refused.status;
-    response.set_content(refused.body + "\n", kJson);
-    return;
-  }
-  SendEvents(*answer.events, response);
+  const std::string body = answer.content_type == kJson ? answer.body + "\n" : answer.body;
+  fields.emplace_back("Content-Type", answer.content_type);
+  const std::string head = ResponseHead(answer.status, fields, body.size());
+  // A client that has gone gets no answer.
+  [[maybe_unused]] const bool sent = connection_.Write(head_only_ ? head : head + body);
 }
 
-void HttpExchange::SendEvents(const ApiResponse::Events& events, httplib::Response& response) {
-  const auto slot = std::make_shared<StreamSlot>(context_.streams);
-  response.set_chunked_content_provider(
-      "text/event-stream", [this, slot, id = events.job, after = events.after, first = true](
-                               size_t /*offset*/, httplib::DataSink& sink) mutable {
-        const std::optional<FollowedEvents> followed = context_.service.Follow(
-            id, after, first ? std::chrono::milliseconds(0) : context_.options.heartbeat);
-        std::string text = !followed || followed->events.empty() ? ":\n\n" : "";
-        first = false;
-        for (const JobEvent& event : followed ? followed->events : std::vector<JobEvent>()) {
-          text += EventText(event);
-          after = event.sequence;
-        }
-        if (!connection_.is_writable() || !sink.write(text.data(), text.size())) {
-          return false;
-        }
-        if (!followed || followed->ended || context_.stopping) {
-          sink.done();
-        }
-        return true;
-      });
+void HttpExchange::SendEvents(const ApiResponse::Events& events) {
+  const StreamSlot slot(context_.streams);
+  std::uint64_t after = events.after;
+  auto wait = std::chrono::milliseconds(0);
+  for (bool ended = false; !ended; wait = context_.options.heartbeat) {
+    const std::optional<FollowedEvents> followed = context_.service.Follow(events.job, after, wait);
+    std::string text = !followed || followed->events.empty() ? ":\n\n" : "";
+    for (const JobEvent& event : followed ? followed->events : std::vector<JobEvent>()) {
+      text += EventText(event);
+      after = event.sequence;
+    }
+    if (!connection_.IsOpen() || !connection_.Write(Chunk(text))) {
+      return;
+    }
+    ended = !followed || followed->ended || context_.stopping;
+  }
+  [[maybe_unused]] const bool sent = connection_.Write(Chunk(""));
 }
 
 }  // namespace sateen

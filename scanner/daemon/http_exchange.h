@@ -7,14 +7,13 @@
 #include "scanner/daemon/access.h"
 #include "scanner/daemon/api.h"
 #include "scanner/daemon/connection.h"
+#include "scanner/daemon/http_message.h"
 #include "scanner/daemon/http_server.h"
-#include "scanner/daemon/httplib.h"
 #include "scanner/daemon/rig_service.h"
 
-// One request and its answer on one connection. For .cc files only.
 namespace sateen {
 
-// What all exchanges of a server share.
+// State that all exchanges of a server share.
 struct ExchangeContext {
   const Api& api;
   const RigService& service;
@@ -24,21 +23,24 @@ struct ExchangeContext {
   const std::atomic<bool>& stopping;
 };
 
-// A server of cpp-httplib's that never listens: it lends its parser. Everything is answered before its
-// routing, so that nothing of a request is matched with regular expressions, decompressed or split.
-class HttpExchange : private httplib::Server {
+/// One request and its answer on one connection. Access is checked before the body is read.
+class HttpExchange {
  public:
   HttpExchange(Connection& connection, const ExchangeContext& context);
   void Run();
 
  private:
-  [[nodiscard]] ApiResponse Answer(const httplib::Request& request);
-  [[nodiscard]] tl::expected<std::string, ApiResponse> ReadBody(const httplib::Request& request);
-  void Send(const ApiResponse& answer, httplib::Response& response);
-  void SendEvents(const ApiResponse::Events& events, httplib::Response& response);
+  // Returns nothing where the client goes, or is too slow, before its head is whole.
+  [[nodiscard]] std::optional<std::string> ReadHead();
+  [[nodiscard]] ApiResponse Answer(const HttpRequest& request);
+  [[nodiscard]] tl::expected<std::string, ApiResponse> ReadBody(const HttpRequest& request);
+  void Send(const ApiResponse& answer);
+  void SendEvents(const ApiResponse::Events& events);
 
   Connection& connection_;
   const ExchangeContext& context_;
+  std::string unread_;      // bytes that came after the head
+  bool head_only_ = false;  // asked with HEAD
 };
 
 }  // namespace sateen

@@ -24,13 +24,12 @@ struct HttpServerOptions {
   int max_streams = 16;      // of them, those that follow events
 };
 
-/// The API over HTTP/1.1 on one listener, one request a connection. cpp-httplib parses requests and
-/// writes answers; sockets, deadlines and limits are here, since its own server (0.11) waits for slow
-/// clients without an end and takes any number of connections.
+/// The API over HTTP/1.1 on one listener, one request per connection. Boost.Beast parses what comes;
+/// sockets, deadlines and limits are here.
 ///
-/// 400 no HTTP, no length that is one, 401, 403, 421 (AccessRules), 408 too slow, 411 a body without
-/// Content-Length, 413 too long a body, 415 a body that is no application/json, 503 too many clients;
-/// everything else is the Api's answer.
+/// 400 no HTTP or no valid Content-Length, 401, 403, 421 (AccessRules), 408 too slow, 411 a body without
+/// Content-Length, 413 too long a body, 414 too long a path, 415 a body that is no application/json,
+/// 503 too many clients; everything else is the Api's answer.
 class HttpServer {
  public:
   // Without `access` everybody who can connect is let in. `api` and `service` must outlive the server.

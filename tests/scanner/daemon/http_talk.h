@@ -16,7 +16,7 @@
 #include <optional>
 #include <string>
 
-// HTTP by hand, right or wrong: what a client of cpp-httplib's would not send.
+// HTTP by hand, right or wrong: bytes that no client library would send.
 namespace sateen::testing {
 
 // One connection; its end closes it.
