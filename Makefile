@@ -21,7 +21,7 @@ CTEST = ctest --output-on-failure --no-tests=error -j$(JOBS)
 OUR_SOURCES = git ls-files -z --cached --others --exclude-standard '*.h' '*.cc' '*.c'
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo programs build test bench accuracy firmware flash fuzz mutants format format-check tidy asan tsan clean
+.PHONY: help setup demo programs build test bench accuracy firmware flash fuzz mutants format format-check tidy asan tsan diagrams clean
 
 help:  ## This list
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 16
@@ -96,6 +96,9 @@ tsan: setup  ## The tests of what runs on several threads, under the thread sani
 	@cmake --build --preset tsan -j$(JOBS) --target $(TSAN_TESTS)
 	@TSAN_OPTIONS="suppressions=$(CURDIR)/tests/tsan.supp" $(CTEST) --test-dir build/tsan \
 	    -R '^(core/parallel|solver/lambertian|scanner/stack_reader)_test$$'
+
+diagrams:  ## Draw the pictures of docs/architecture.md anew; needs graphviz
+	@for name in house flows; do dot -Tsvg docs/images/$$name.dot -o docs/images/$$name.svg || exit 1; done
 
 clean:  ## Remove build/
 	@rm -rf build
