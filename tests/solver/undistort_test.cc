@@ -98,6 +98,25 @@ TEST(Undistorted, PixelsWithoutSourcesHaveAReason) {
   EXPECT_EQ(pin.reason.At(80, 60), static_cast<uint8_t>(Reason::kSolved));
 }
 
+TEST(Undistorted, AReasonIsThatOfTheHeaviestNeighbour) {
+  const Camera camera = BentCamera();
+  NormalField field = FieldOf(camera);
+  for (int v = 0; v < camera.size_px.height; ++v) {
+    for (int u = 0; u < camera.size_px.width; ++u) {
+      field.reason.At(u, v) = static_cast<uint8_t>(u % 2 == 0 ? Reason::kSaturated : Reason::kDark);
+      field.samples.At(u, v) = u % 2 == 0 ? 1 : 2;
+    }
+  }
+
+  const NormalField result = Undistorted(field, camera).value();
+
+  // The heaviest neighbour is in the nearest column, and so is the one whose samples are taken.
+  for (size_t p = 0; p < result.reason.pixels.size(); ++p) {
+    const Reason expected = result.samples.pixels[p] == 1 ? Reason::kSaturated : Reason::kDark;
+    ASSERT_EQ(result.reason.pixels[p], static_cast<uint8_t>(expected));
+  }
+}
+
 TEST(Undistorted, WithoutDistortionNothingChanges) {
   Camera camera = BentCamera();
   camera.distortion = {};
