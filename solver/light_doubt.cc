@@ -1,10 +1,11 @@
 #include "solver/light_doubt.h"
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 
 #include "core/angle.h"
+#include "core/linear_algebra.h"
 
 namespace sateen {
 namespace {
@@ -60,7 +61,9 @@ Forms FormsAt(const Lights& lights, const Eigen::Vector3d& x_mm) {
   for (size_t k = 0; k < lights.size(); ++k) {
     directions.row(static_cast<Eigen::Index>(k)) = IncidentAt(lights[k], x_mm).l;
   }
-  const Eigen::Matrix3Xd g = directions.completeOrthogonalDecomposition().pseudoInverse();  // (1)
+  const Eigen::Matrix3Xd g =
+      SolveBySvd(directions, Eigen::MatrixXd::Identity(directions.rows(), directions.rows()))
+          .x;  // (1)
   const Vector6d one{{1.0, 1.0, 1.0, 0.0, 0.0, 0.0}};
   Forms forms;
   for (size_t k = 0; k < lights.size(); ++k) {

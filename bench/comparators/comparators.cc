@@ -1,10 +1,11 @@
 #include "bench/comparators/comparators.h"
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <algorithm>
 #include <functional>
 #include <utility>
 
+#include "core/linear_algebra.h"
 #include "imaging/color.h"
 #include "solver/least_squares/pixel_system.h"
 
@@ -20,16 +21,16 @@ constexpr size_t kMostForSparseBayesian = 20;  // its time grows with the cube o
 // Weighted least squares again and again, by LDLT; `weight` of the absolute residual.
 Estimator Reweighted(std::function<double(double residual, double scale)> weight) {
   return [weight = std::move(weight)](const Eigen::MatrixX3d& l, const Eigen::VectorXd& i) {
-    Eigen::MatrixXd normal_matrix = l.transpose() * l;
-    Eigen::VectorXd n = normal_matrix.ldlt().solve(l.transpose() * i);
+    Eigen::Vector3d n = SolveNormalEquations(l, i);
     for (int step = 0; step < kSteps; ++step) {
       const Eigen::VectorXd r = (i - l * n).cwiseAbs();
       const Eigen::VectorXd w =
           r.unaryExpr([&](double residual) { return weight(residual, i.maxCoeff()); });
-      normal_matrix = l.transpose() * w.asDiagonal() * l;
-      n = normal_matrix.ldlt().solve(l.transpose() * w.asDiagonal() * i);
+      const Eigen::VectorXd root = w.cwiseSqrt();
+      n = SolveNormalEquations(Eigen::MatrixX3d(root.asDiagonal() * l),
+                               Eigen::VectorXd(root.cwiseProduct(i)));
     }
-    return Eigen::Vector3d(n);
+    return n;
   };
 }
 
@@ -46,13 +47,13 @@ Eigen::Vector3d SparseBayesian(const Eigen::MatrixX3d& l, const Eigen::VectorXd&
   for (int step = 0; step < 100; ++step) {
     Eigen::MatrixXd sigma = kDiffuseVariance * l * l.transpose();
     sigma.diagonal() += gamma + Eigen::VectorXd::Constant(count, kNoise);
-    const Eigen::MatrixXd inverse = sigma.inverse();
+    const Eigen::MatrixXd inverse = InverseOfSymmetric(sigma);
     e = gamma.cwiseProduct(inverse * i);
     const Eigen::VectorXd variance =
         gamma - gamma.cwiseProduct(inverse.diagonal()).cwiseProduct(gamma);
     gamma = (e.cwiseAbs2() + variance).cwiseMax(1e-12);
   }
-  return scale * l.colPivHouseholderQr().solve(i - e);
+  return scale * SolveByQr(l, i - e);
 }
 
 Estimator EstimatorOf(Comparator comparator) {
@@ -66,8 +67,7 @@ Estimator EstimatorOf(Comparator comparator) {
       return SparseBayesian;
     default:
       return [](const Eigen::MatrixX3d& l, const Eigen::VectorXd& i) {
-        const Eigen::MatrixXd normal_matrix = l.transpose() * l;
-        return Eigen::Vector3d(normal_matrix.ldlt().solve(l.transpose() * i));
+        return SolveNormalEquations(l, i);
       };
   }
 }
@@ -127,7 +127,8 @@ void SolveWholeImage(const LightStack& stack, const Rig& rig, const std::optiona
           sample.cast<double>().cwiseQuotient(light.flux_rgb).dot(luminance);
     }
   }
-  const Eigen::MatrixXd n = l.bdcSvd(Eigen::ComputeThinU | Eigen::ComputeThinV).solve(i);
+  // Eigen's bdcSvd leaves matrices of fewer than 16 columns to JacobiSVD.
+  const Eigen::MatrixXd n = SolveBySvd(l, i).x;
   for (size_t j = 0; j < pixels.size(); ++j) {
     StoreNormal(n.col(static_cast<Eigen::Index>(j)), pixels[j], field);
   }

@@ -1,8 +1,9 @@
 #include "solver/least_squares/least_squares.h"
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <algorithm>
 
+#include "core/linear_algebra.h"
 #include "solver/kernels/fast_kernel.h"
 #include "solver/least_squares/pixel_geometry.h"
 #include "solver/least_squares/pixel_system.h"
@@ -42,16 +43,16 @@ Status CheckStack(const LightStack& stack, const std::optional<Mask>& mask) {
 
 // The condition number of the lights' directions; only for lights that are all distant.
 Status CheckDirections(const Lights& lights, double max_condition) {
-  Eigen::MatrixX3d directions(static_cast<Eigen::Index>(lights.size()), 3);
-  for (size_t k = 0; k < lights.size(); ++k) {
-    directions.row(static_cast<Eigen::Index>(k)) = lights[k].direction.transpose();
+  Eigen::Matrix3d gram = Eigen::Matrix3d::Zero();
+  for (const Light& light : lights) {
+    gram += light.direction * light.direction.transpose();
   }
-  const Eigen::Vector3d sigma = directions.jacobiSvd().singularValues();
-  if (!(sigma[0] <= max_condition * sigma[2])) {
+  const double condition = ConditionOfGram(gram);
+  if (!(condition <= max_condition)) {
     return Fail(ErrorCode::kDegenerate,
                 "all {} lights lie in or near one plane (condition number {:.3g}, need at most "
                 "{:.3g}); add a light out of it",
-                lights.size(), sigma[0] / sigma[2], max_condition);
+                lights.size(), condition, max_condition);
   }
   return {};
 }
@@ -124,11 +125,6 @@ void ClearRows(const std::optional<Mask>& mask, int row_begin, int row_end, Norm
     const bool inside = !mask || mask->pixels[p] != 0;
     field.reason.pixels[p] = static_cast<uint8_t>(inside ? kPending : Reason::kOutsideMask);
   }
-}
-
-double ConditionOfLights(const PixelSystem& system) {
-  const Eigen::VectorXd sigma = Eigen::MatrixX3d(system.L()).jacobiSvd().singularValues();
-  return sigma[0] / sigma[2];
 }
 
 bool IsFast(Backend backend) { return backend == Backend::kFast || backend == Backend::kAuto; }
@@ -213,8 +209,9 @@ void LeastSquaresRows::FindMisfits(MisfitSample& sample) const {
     if (reasons[j] == static_cast<uint8_t>(kPending) && options_->backend != Backend::kFast) {
       const size_t pixel = sample.pixels[j];
       system.Gather(static_cast<int>(pixel % width), static_cast<int>(pixel / width));
-      const bool solved = system.SampleReason() == Reason::kSolved &&
-                          ConditionOfLights(system) <= options_->max_condition;
+      const bool solved =
+          system.SampleReason() == Reason::kSolved &&
+          ConditionOfGram(system.L().transpose() * system.L()) <= options_->max_condition;
       sample.samples[j] = static_cast<uint8_t>(solved ? std::min(system.Count(), 255) : 0);
       sample.misfits[j] = solved ? static_cast<float>(PlainWeighted(system, *noise_).misfit) : 0.0F;
     } else if (reasons[j] != static_cast<uint8_t>(Reason::kSolved)) {

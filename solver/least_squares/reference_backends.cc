@@ -1,11 +1,12 @@
 #include "solver/least_squares/reference_backends.h"
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
 #include "core/check.h"
+#include "core/linear_algebra.h"
 #include "solver/least_squares/pixel_system.h"
 
 namespace sateen {
@@ -20,33 +21,22 @@ struct Solution {
 // As the source and textbooks have it: dynamic size, double, decomposed anew for each pixel.
 struct JacobiSvd {
   static Solution Solve(const PixelSystem& system) {
-    const Eigen::JacobiSVD<Eigen::MatrixXd> svd(system.L(),
-                                                Eigen::ComputeThinU | Eigen::ComputeThinV);
-    const Eigen::VectorXd& sigma = svd.singularValues();
-    return {svd.solve(system.Rhs()), sigma[0] / sigma[2]};
+    const SvdSolution solution = SolveBySvd(system.L(), system.Rhs());
+    return {solution.x, solution.condition};
   }
 };
 
-// The condition number from the eigenvalues of L^T L, exact enough below 1e7.
-double ConditionOf(const Eigen::Matrix3d& normal_matrix) {
-  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(normal_matrix, Eigen::EigenvaluesOnly);
-  const Eigen::Vector3d& lambda = eigen.eigenvalues();
-  return lambda[0] > 0.0 ? std::sqrt(lambda[2] / lambda[0])
-                         : std::numeric_limits<double>::infinity();
-}
-
 struct Qr {
   static Solution Solve(const PixelSystem& system) {
-    const Eigen::Matrix<double, Eigen::Dynamic, 3> l = system.L();
-    return {l.colPivHouseholderQr().solve(system.Rhs()), ConditionOf(l.transpose() * l)};
+    return {SolveByQr(system.L(), system.Rhs()),
+            ConditionOfGram(system.L().transpose() * system.L())};
   }
 };
 
 struct Ldlt {
   static Solution Solve(const PixelSystem& system) {
-    const Eigen::Matrix3d normal_matrix = system.L().transpose() * system.L();
-    return {normal_matrix.ldlt().solve(system.L().transpose() * system.Rhs()),
-            ConditionOf(normal_matrix)};
+    return {SolveNormalEquations(system.L(), Eigen::MatrixX4d(system.Rhs())),
+            ConditionOfGram(system.L().transpose() * system.L())};
   }
 };
 

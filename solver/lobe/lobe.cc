@@ -1,6 +1,6 @@
 #include "solver/lobe/lobe.h"
 
-#include <Eigen/Dense>
+#include <Eigen/LU>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "core/angle.h"
+#include "core/linear_algebra.h"
 #include "imaging/color.h"
 
 namespace sateen {
@@ -99,7 +100,7 @@ LobeFit FitFrom(const Eigen::Vector3d& start, const LobeSamples& samples, const 
   fit.at = EvaluateAt(samples, shape, start);
   for (int step = 0; step < kLobeSteps; ++step) {
     const double before = fit.at.chi_squared;
-    Eigen::Vector3d move = fit.at.information.ldlt().solve(fit.at.gradient);
+    Eigen::Vector3d move = SolveSymmetric(fit.at.information, fit.at.gradient);
     for (int half = 0; half <= kHalvings && move.allFinite(); ++half, move *= 0.5) {
       const Evaluation next = EvaluateAt(samples, shape, fit.n + move);
       if (next.chi_squared < before) {
@@ -116,7 +117,7 @@ LobeFit FitFrom(const Eigen::Vector3d& start, const LobeSamples& samples, const 
 }
 
 Eigen::Vector3d LeastSquares(const LobeSamples& samples, const LobeShape& /*shape*/) {
-  return (samples.l.transpose() * samples.l).ldlt().solve(samples.l.transpose() * samples.i.col(3));
+  return SolveNormalEquations(samples.l, Eigen::VectorXd(samples.i.col(3)));
 }
 
 // Least squares of the darker half of the samples, at least four.
@@ -127,7 +128,7 @@ Eigen::Vector3d DarkerHalf(const LobeSamples& samples, const LobeShape& /*shape*
   order.resize(std::max<size_t>(4, order.size() / 2));
   const Eigen::MatrixX3d l = samples.l(order, Eigen::all);
   const Eigen::VectorXd i = samples.i(order, 3);
-  return (l.transpose() * l).ldlt().solve(l.transpose() * i);
+  return SolveNormalEquations(l, i);
 }
 
 // The normal that mirrors the brightest lights, with the body that the samples leave to it.
@@ -181,8 +182,7 @@ LobeSamples::LobeSamples(Eigen::MatrixX3d directions, Eigen::MatrixX4d samples,
 LobeSamples LobeSamplesOf(const PixelSystem& system, const StackNoise& noise, double scale_squared,
                           const Eigen::Vector3d& v, double limit) {
   const Eigen::MatrixX3d l = system.L();
-  const Eigen::Matrix<double, 3, 4> n0 =
-      (l.transpose() * l).ldlt().solve(l.transpose() * system.Rhs());
+  const Eigen::Matrix<double, 3, 4> n0 = SolveNormalEquations(l, Eigen::MatrixX4d(system.Rhs()));
   return {l, system.Rhs(), LuminanceWeightsOf(system, noise, n0) / scale_squared, v,
           limit / scale_squared};
 }

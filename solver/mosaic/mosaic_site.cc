@@ -1,10 +1,11 @@
 #include "solver/mosaic/mosaic_site.h"
 
-#include <Eigen/Dense>
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 
 #include "core/angle.h"
+#include "core/linear_algebra.h"
 #include "solver/least_squares/fast_rows.h"
 #include "solver/noise.h"
 
@@ -118,10 +119,9 @@ SiteSolution MosaicSite::Solve(int column, int row, const std::vector<uint16_t>&
   }
   const auto l = l_.topRows(solution.samples);
   const auto i = i_.head(solution.samples);
-  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(l, Eigen::ComputeThinU | Eigen::ComputeThinV);
-  const Eigen::VectorXd& sigma = svd.singularValues();
-  solution.n = svd.solve(i);
-  if (!(sigma[0] <= options_.max_condition * sigma[2]) || !solution.n.allFinite() ||
+  const SvdSolution svd = SolveBySvd(l, i);
+  solution.n = svd.x;
+  if (!(svd.condition <= options_.max_condition) || !solution.n.allFinite() ||
       solution.n.isZero(0.0)) {
     solution.reason = Reason::kIllConditioned;
     solution.n.setZero();
@@ -157,7 +157,7 @@ std::optional<LobeSamples> MosaicSite::LobeSamplesAt(int column, int row, const 
   }
   const Eigen::MatrixX3d l = l_.topRows(solution.samples);
   const Eigen::VectorXd i = i_.head(solution.samples);
-  const Eigen::Vector3d n = (l.transpose() * l).ldlt().solve(l.transpose() * i);
+  const Eigen::Vector3d n = SolveNormalEquations(l, i);
   Eigen::VectorXd weights(solution.samples);
   for (Eigen::Index k = 0; k < solution.samples; ++k) {
     weights[k] = WeightOf(k, static_cast<size_t>(row % 2 * 2 + column % 2), n);
@@ -176,8 +176,7 @@ void MosaicSite::Weigh(size_t site, SiteSolution& solution) const {
   }
   const Eigen::MatrixXd weighted = root_weights.asDiagonal() * l;
   const Eigen::VectorXd rhs = root_weights.cwiseProduct(i_.head(solution.samples));
-  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(weighted, Eigen::ComputeThinU | Eigen::ComputeThinV);
-  solution.n = svd.solve(rhs);  // (3)
+  solution.n = SolveBySvd(weighted, rhs).x;  // (3)
   if (solution.samples > 3) {
     solution.misfit = (rhs - weighted * solution.n).squaredNorm() / (solution.samples - 3);
   }

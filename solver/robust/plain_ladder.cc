@@ -1,12 +1,13 @@
 #include "solver/robust/plain_ladder.h"
 
-#include <Eigen/Dense>
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <vector>
 
 #include "core/angle.h"
+#include "core/linear_algebra.h"
 #include "imaging/color.h"
 #include "solver/kernels/consensus.h"
 
@@ -37,12 +38,6 @@ PlainVariances VariancesOf(const Eigen::Matrix3d& c, const Eigen::Vector3d& n) {
 double SpreadOf(double variance, double mean_square) {
   return std::hypot(static_cast<double>(kUncertaintyFactor) * std::sqrt(variance * mean_square),
                     static_cast<double>(kLeastModelUncertainty));
-}
-
-double ConditionSquared(const Eigen::Matrix3d& a) {
-  const Eigen::Vector3d values =
-      Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(a, Eigen::EigenvaluesOnly).eigenvalues();
-  return values[2] / std::max(0.0, values[0]);
 }
 
 // A pixel's samples in order of brightness, in medians.
@@ -187,8 +182,7 @@ PlainSearch SearchPlain(const PixelSystem& system, const Eigen::Vector3d& w) {
 
 PlainAnswer PlainWeighted(const PixelSystem& system, const StackNoise& noise) {
   const auto l = system.L();
-  const Eigen::Matrix3d first = l.transpose() * l;
-  const Eigen::Vector3d n = first.ldlt().solve(l.transpose() * system.Rhs().col(3));
+  const Eigen::Vector3d n = SolveNormalEquations(l, Eigen::VectorXd(system.Rhs().col(3)));
   PlainAnswer answer;
   answer.residual = (system.Rhs().col(3) - l * n).norm() / std::sqrt(system.Count());
   const Eigen::Vector4d sum = system.Rhs().colwise().sum().transpose();
@@ -258,7 +252,7 @@ PlainAnswer PlainConsensus(const PixelSystem& system, double max_condition) {
     n = n_rgb * ranked.w;
   }
   sums = SumsAt(system, ranked, n, /*start=*/false);
-  if (!n.allFinite() || !(ConditionSquared(sums.a) <= max_condition * max_condition)) {
+  if (!n.allFinite() || !(ConditionOfGram(sums.a) <= max_condition)) {
     return {};
   }
   const double spread = sums.squares / std::max(1.0, sums.weights - 3.0);
