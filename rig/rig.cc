@@ -1,11 +1,12 @@
 #include "rig/rig.h"
 
-#include <Eigen/SVD>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <set>
 
 #include "core/json.h"
+#include "core/linear_algebra.h"
 #include "rig/light_json.h"
 
 namespace sateen {
@@ -22,8 +23,7 @@ Eigen::Matrix3d NearestRotation(const Eigen::Matrix3d& r) {
   if ((r.transpose() * r - Eigen::Matrix3d::Identity()).lpNorm<Eigen::Infinity>() <= kRounding) {
     return r;
   }
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(r, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  return svd.matrixU() * svd.matrixV().transpose();
+  return NearestOrthogonal(r);
 }
 
 Result<Camera> ReadCamera(JsonReader reader, const std::string& what) {

@@ -1,12 +1,12 @@
 #include "calibration/check/check_fit.h"
 
-#include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <algorithm>
 #include <array>
 #include <cmath>
 
 #include "calibration/check/check_unknowns.h"
+#include "core/linear_algebra.h"
 #include "core/parallel.h"
 
 namespace sateen {
@@ -176,10 +176,9 @@ ChangeFit FitChange(const CheckModel& model, const SampleWeights& weights, const
     const ChangeNormal normal(places, NormalsOf(model, weights, fit.change, wanted, task),
                               fit.change);
     fit.chi2 = normal.chi2;
-    const Eigen::LDLT<Eigen::MatrixXd> factors(normal.matrix);
-    const Eigen::VectorXd by = factors.solve(normal.gradient);
+    const Eigen::VectorXd by = SolveSymmetric(normal.matrix, normal.gradient);
     if (step == kFitSteps || normal.gradient.dot(by) < kSmallGain) {
-      covariance = factors.solve(Eigen::MatrixXd::Identity(places.Count(), places.Count()));
+      covariance = InverseOfSymmetric(normal.matrix);
       break;
     }
     places.ForEach([&](int place, size_t s, size_t k, int local) {

@@ -1,6 +1,6 @@
 #include "calibration/check/check_settle.h"
 
-#include <Eigen/Cholesky>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -8,6 +8,7 @@
 
 #include "calibration/check/check_unknowns.h"
 #include "calibration/fit/robust_spread.h"
+#include "core/linear_algebra.h"
 #include "core/parallel.h"
 
 namespace sateen {
@@ -64,7 +65,8 @@ void StepLight(const CheckModel& model, size_t light, const SheetWeights& weight
   sum.AddPriorsOf(light, change);
   const Eigen::Matrix<double, kOfLight, kOfLight> matrix =
       sum.matrix.topLeftCorner<kOfLight, kOfLight>();
-  const Eigen::Matrix<double, kOfLight, 1> by = matrix.ldlt().solve(sum.gradient.head<kOfLight>());
+  const Eigen::Matrix<double, kOfLight, 1> by =
+      SolveSymmetric(matrix, Eigen::Matrix<double, kOfLight, 1>(sum.gradient.head<kOfLight>()));
   for (int i = 0; i < kOfLight; ++i) {
     UnknownAt(change, 0, light, i) += by[i];
   }

@@ -1,6 +1,5 @@
 #include "calibration/check/light_check.h"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>

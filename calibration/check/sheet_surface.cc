@@ -1,7 +1,7 @@
 #include "calibration/check/sheet_surface.h"
 
-#include <Eigen/Cholesky>
 #include <Eigen/Geometry>
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 

@@ -1,6 +1,6 @@
 #include "calibration/lights/field_fit.h"
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -9,6 +9,7 @@
 
 #include "calibration/fit/robust_spread.h"
 #include "calibration/lights/light_residuals.h"
+#include "core/linear_algebra.h"
 
 namespace sateen {
 namespace {
@@ -155,7 +156,7 @@ class FieldFitter {
     for (double& gain : light_.field.gain) {
       gain = std::max(gain / mean, kLeastGain);
     }
-    return shares.transpose() * normal_.ldlt().solve(shares);
+    return shares.transpose() * SolveSymmetric(normal_, shares);
   }
 
  private:
@@ -271,7 +272,7 @@ class FieldFitter {
     const Eigen::MatrixXd normal = normal_;
     const Eigen::VectorXd gradient = gradient_;
     AddPenalty(roughness, variance);
-    const Eigen::VectorXd change = -normal_.ldlt().solve(gradient_);
+    const Eigen::VectorXd change = -SolveSymmetric(normal_, gradient_);
     normal_ = normal;
     gradient_ = gradient;
     ++iterations_;

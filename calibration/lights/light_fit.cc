@@ -1,6 +1,6 @@
 #include "calibration/lights/light_fit.h"
 
-#include <Eigen/Eigenvalues>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 

@@ -2,11 +2,12 @@
 
 #include <ceres/ceres.h>
 
-#include <Eigen/Eigenvalues>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 
 #include "calibration/fit/robust_spread.h"
+#include "core/linear_algebra.h"
 
 namespace sateen {
 namespace {
@@ -105,14 +106,10 @@ Result<Eigen::MatrixXd> CovarianceOf(ceres::Problem& problem) {
   const Eigen::VectorXd scale = normal.diagonal().cwiseSqrt().cwiseMax(1e-300);
   const Eigen::MatrixXd scaled =
       scale.cwiseInverse().asDiagonal() * normal * scale.cwiseInverse().asDiagonal();
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scaled);
-  if (!(eigen.eigenvalues().minCoeff() > kLeastEigenvalue)) {
+  if (!(DecomposeSymmetric(scaled).values[0] > kLeastEigenvalue)) {
     return Fail(ErrorCode::kDegenerate, "the sheets do not determine the light; add tilted sheets");
   }
-  const Eigen::MatrixXd inverse = eigen.eigenvectors() *
-                                  eigen.eigenvalues().cwiseInverse().asDiagonal() *
-                                  eigen.eigenvectors().transpose();
-  return Eigen::MatrixXd(scale.cwiseInverse().asDiagonal() * inverse *
+  return Eigen::MatrixXd(scale.cwiseInverse().asDiagonal() * InverseOfSymmetric(scaled) *
                          scale.cwiseInverse().asDiagonal());
 }
 

@@ -1,9 +1,11 @@
 #include "calibration/lights/seed_procedure.h"
 
-#include <Eigen/Dense>
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+
+#include "core/linear_algebra.h"
 
 namespace sateen {
 namespace {
@@ -71,7 +73,7 @@ class Procedure {
       if (options_.direction_step == DirectionStep::kEquation) {
         a(3, 3) = 1.0;  // phi has no part in it
       }
-      const Eigen::Vector4d change = a.ldlt().solve(b);
+      const Eigen::Vector4d change = SolveSymmetric(a, b);
       s += change.head<3>();
       log_phi += change[3];
       if (!(change.head<3>().norm() > kLeastPositionStepMm)) {

@@ -1,11 +1,12 @@
 #include "calibration/print/plane_map.h"
 
 #include <Eigen/Geometry>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core.hpp>
+
+#include "core/linear_algebra.h"
 
 namespace sateen {
 namespace {
@@ -16,13 +17,17 @@ constexpr double kSmallestWindowPx = 2.0;
 constexpr double kLargestWindowPx = 12.0;
 
 bool LieInALine(const std::vector<Eigen::Vector3d>& points_mm) {
-  Eigen::Matrix2Xd x(2, static_cast<Eigen::Index>(points_mm.size()));
-  for (size_t i = 0; i < points_mm.size(); ++i) {
-    x.col(static_cast<Eigen::Index>(i)) = points_mm[i].head<2>();
+  Eigen::Vector2d mean = Eigen::Vector2d::Zero();
+  for (const Eigen::Vector3d& point : points_mm) {
+    mean += point.head<2>() / static_cast<double>(points_mm.size());
   }
-  x.colwise() -= x.rowwise().mean().eval();
-  const Eigen::Vector2d extent = Eigen::JacobiSVD<Eigen::Matrix2Xd>(x).singularValues();
-  return !(extent[1] > kThinnest * extent[0]);
+  Eigen::Matrix2d spread = Eigen::Matrix2d::Zero();
+  for (const Eigen::Vector3d& point : points_mm) {
+    const Eigen::Vector2d off = point.head<2>() - mean;
+    spread += off * off.transpose();
+  }
+  const Eigen::VectorXd squares = DecomposeSymmetric(spread).values;
+  return !(squares[0] > kThinnest * kThinnest * squares[1]);
 }
 
 }  // namespace

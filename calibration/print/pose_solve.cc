@@ -1,12 +1,12 @@
 #include "calibration/print/pose_solve.h"
 
-#include <Eigen/Cholesky>
-#include <Eigen/SVD>
+#include <Eigen/Geometry>
 #include <cmath>
 #include <optional>
 
 #include "calibration/print/plane_map.h"
 #include "core/angle.h"
+#include "core/linear_algebra.h"
 
 namespace sateen {
 namespace {
@@ -56,7 +56,8 @@ PlanePose RefinedPose(const Camera& camera, const Eigen::Isometry3d& start,
     for (int attempt = 0; attempt < kMostPoseSteps; ++attempt) {
       Matrix6d damped = normal;
       damped.diagonal() *= 1.0 + damping;
-      const Eigen::Isometry3d next = Moved(result.camera_from_plane, -damped.ldlt().solve(slope));
+      const Eigen::Isometry3d next =
+          Moved(result.camera_from_plane, -SolveSymmetric(damped, slope));
       const Eigen::VectorXd at_next = ResidualsPx(camera, next, points_mm, corners_px);
       if (at_next.squaredNorm() < residuals.squaredNorm()) {
         settled = residuals.squaredNorm() - at_next.squaredNorm() <
@@ -75,8 +76,7 @@ PlanePose RefinedPose(const Camera& camera, const Eigen::Isometry3d& start,
   const double cost = residuals.squaredNorm();
   const auto count = static_cast<double>(points_mm.size());
   result.rms_px = std::sqrt(cost / count);
-  result.covariance =
-      cost / std::max(2.0 * count - 6.0, 1.0) * normal.ldlt().solve(Matrix6d::Identity());
+  result.covariance = cost / std::max(2.0 * count - 6.0, 1.0) * InverseOfSymmetric(normal);
   return result;
 }
 
@@ -98,9 +98,8 @@ std::vector<Eigen::Isometry3d> RoughPoses(const std::vector<Eigen::Vector3d>& po
   }
   Eigen::Matrix3d axes;
   axes << map.leftCols<2>(), map.col(0).cross(map.col(1));
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(axes, Eigen::ComputeFullU | Eigen::ComputeFullV);
   Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
-  pose.linear() = svd.matrixU() * svd.matrixV().transpose();
+  pose.linear() = NearestOrthogonal(axes);
   pose.translation() = map.col(2);
   const Eigen::Vector3d seen_at = pose * center_mm;
   const Eigen::Vector3d normal = pose.linear().col(2);

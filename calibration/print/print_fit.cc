@@ -1,11 +1,12 @@
 #include "calibration/print/print_fit.h"
 
-#include <Eigen/Cholesky>
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <optional>
 
 #include "calibration/print/marker_blur.h"
+#include "core/linear_algebra.h"
 
 namespace sateen {
 namespace {
@@ -94,8 +95,7 @@ PatchSums SumsOf(const Patch& patch, const Eigen::Isometry3d& pose, double blur_
     moments += row.basis * pixel.value;
     rows.push_back(row);
   }
-  const Eigen::LDLT<Eigen::Matrix<double, 6, 6>> solver(gram);
-  const Basis c = solver.solve(moments);
+  const Basis c = SolveSymmetric(gram, moments);
   PatchSums sums{.contrast = std::abs(c[3])};
   Eigen::Matrix<double, 6, kPrintUnknowns> cross = Eigen::Matrix<double, 6, kPrintUnknowns>::Zero();
   for (size_t i = 0; i < rows.size(); ++i) {
@@ -107,7 +107,7 @@ PatchSums SumsOf(const Patch& patch, const Eigen::Isometry3d& pose, double blur_
     sums.normal += by * by.transpose();
     cross += rows[i].basis * by.transpose();
   }
-  sums.normal -= cross.transpose() * solver.solve(cross);
+  sums.normal -= cross.transpose() * SolveSymmetric(gram, cross);
   return sums;
 }
 
@@ -209,7 +209,7 @@ State Descend(const std::vector<Patch>& patches, State state) {
       slope += one.slope;
     }
     normal.diagonal() *= 1.0 + damping;
-    const PrintUnknowns move = normal.ldlt().solve(slope);
+    const PrintUnknowns move = SolveSymmetric(normal, slope);
     State next = StateAt(patches, Moved(state.pose, move.head<6>()),
                          state.log_blur + std::clamp(move[6], -0.5, 0.5));
     const double fall = state.Cost() - next.Cost();
@@ -254,7 +254,7 @@ Result<PrintFit> FitPrint(const Image<float>& picture, const Camera& lens,
     fit.misfit[marker_of_patch[i]] = MisfitOf(patches[i], state.sums[i]);
     scores += state.sums[i].slope * state.sums[i].slope.transpose();
   }
-  const Normal inverse = NormalOf(state).ldlt().solve(Normal::Identity());
+  const Normal inverse = InverseOfSymmetric(NormalOf(state));
   const auto count = static_cast<double>(patches.size());
   const double unbiased = count / std::max(count - 0.5 * kPrintUnknowns, 1.0);
   fit.covariance = unbiased * (inverse * scores * inverse).topLeftCorner<6, 6>();

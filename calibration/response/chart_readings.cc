@@ -1,9 +1,11 @@
 #include "calibration/response/chart_readings.h"
 
-#include <Eigen/Dense>
+#include <Eigen/Core>
 #include <algorithm>
 #include <array>
 #include <cmath>
+
+#include "core/linear_algebra.h"
 
 namespace sateen {
 namespace {
@@ -156,7 +158,7 @@ double UnevennessOf(const PatchSites& sites, const std::vector<uint16_t>& dn, do
       filled += 1.0;
     }
   }
-  const Eigen::Vector3d plane = normal.ldlt().solve(right);
+  const Eigen::Vector3d plane = SolveSymmetric(normal, right);
   double largest = 0.0;
   std::vector<double> misfits;
   for (size_t part = 0; part < kParts; ++part) {

@@ -1,6 +1,6 @@
 #include "calibration/response/photon_transfer.h"
 
-#include <Eigen/Dense>
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <map>

@@ -1,11 +1,12 @@
 #include "calibration/sheet/flatness.h"
 
-#include <Eigen/Dense>
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <optional>
 
 #include "calibration/fit/robust_spread.h"
+#include "core/linear_algebra.h"
 #include "imaging/color.h"
 
 namespace sateen {
@@ -45,7 +46,7 @@ struct BlockNormal {
     if (lights < kFewestLightsSeen) {
       return std::nullopt;
     }
-    const Eigen::Vector3d n = a.ldlt().solve(b).normalized();
+    const Eigen::Vector3d n = SolveSymmetric(a, b).normalized();
     return n.allFinite() ? std::optional<Eigen::Vector3d>(n - normal) : std::nullopt;
   }
 };

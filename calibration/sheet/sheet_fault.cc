@@ -1,9 +1,10 @@
 #include "calibration/sheet/sheet_fault.h"
 
-#include <Eigen/Eigenvalues>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 
+#include "core/linear_algebra.h"
 #include "core/statistics.h"
 
 namespace sateen {
@@ -86,13 +87,13 @@ Eigen::Vector2d ExtentOf(const std::vector<Eigen::Vector2d>& points) {
   for (const Eigen::Vector2d& point : points) {
     spread += (point - mean) * (point - mean).transpose();
   }
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> axes(spread);
+  const SymmetricEigen axes = DecomposeSymmetric(spread);
   Eigen::Vector2d extent;
   for (const Eigen::Index axis : {0, 1}) {
     std::vector<double> along;
     along.reserve(points.size());
     for (const Eigen::Vector2d& point : points) {
-      along.push_back(axes.eigenvectors().col(1 - axis).dot(point));  // the longer first
+      along.push_back(axes.vectors.col(1 - axis).dot(point));  // the longer first
     }
     extent[axis] = Quantile(along, 1.0 - kInner) - Quantile(along, kInner);
   }

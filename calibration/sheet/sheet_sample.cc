@@ -1,8 +1,10 @@
 #include "calibration/sheet/sheet_sample.h"
 
-#include <Eigen/Eigenvalues>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
+
+#include "core/linear_algebra.h"
 
 namespace sateen {
 
@@ -14,10 +16,7 @@ double WorstDirectionSd(const std::vector<SheetSample>& samples, const Eigen::Ve
     const Eigen::Vector3d l = d.normalized();
     const Eigen::Matrix3d across = (Eigen::Matrix3d::Identity() - l * l.transpose()) / d.norm();
     const Eigen::Matrix3d spread = across * covariance * across.transpose();
-    worst = std::max(worst,
-                     Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(spread, Eigen::EigenvaluesOnly)
-                         .eigenvalues()
-                         .maxCoeff());
+    worst = std::max(worst, SymmetricEigenvalues(spread)[2]);
   }
   return std::sqrt(worst);
 }

@@ -1,6 +1,5 @@
 #include "calibration/spheres/sphere_edges.h"
 
-#include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
@@ -9,6 +8,8 @@
 #include <optional>
 #include <random>
 #include <utility>
+
+#include "core/linear_algebra.h"
 
 namespace sateen {
 namespace {
@@ -162,7 +163,7 @@ PlaneCircle FitPlaneCircle(std::vector<RimEdge>& edges, PlaneCircle circle, doub
     if (used.size() < 8) {
       break;
     }
-    const Eigen::Vector3d change = normal.ldlt().solve(right);
+    const Eigen::Vector3d change = SolveSymmetric(normal, right);
     circle.center += change.head<2>();
     circle.radius += change[2];
     std::ranges::nth_element(sizes, sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2));

@@ -1,12 +1,11 @@
 #include "calibration/spheres/spheres.h"
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 
 #include "core/angle.h"
+#include "core/linear_algebra.h"
 
 namespace sateen {
 namespace {
@@ -43,12 +42,11 @@ std::optional<RayMeeting> MeetingOf(const std::vector<SphereRay>& rays) {
   RayMeeting meeting;
   for (int round = 0; round < kWeightRounds; ++round) {
     const RayNormal normal = NormalOf(rays, distances);
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(normal.matrix);
-    if (!(eigen.eigenvalues()[0] > kNearlyParallel * eigen.eigenvalues()[2])) {
+    const Eigen::Vector3d eigenvalues = SymmetricEigenvalues(normal.matrix);
+    if (!(eigenvalues[0] > kNearlyParallel * eigenvalues[2])) {
       return std::nullopt;
     }
-    meeting.inverse = eigen.eigenvectors() * eigen.eigenvalues().cwiseInverse().asDiagonal() *
-                      eigen.eigenvectors().transpose();
+    meeting.inverse = InverseOfSymmetric(normal.matrix);
     meeting.at = meeting.inverse * normal.right;
     for (size_t j = 0; j < rays.size(); ++j) {
       distances[j] = rays[j].direction.dot(meeting.at - rays[j].from);
@@ -141,12 +139,11 @@ Result<SphereLight> LightFromRays(const std::vector<SphereRay>& rays, bool has_c
     const double own = missed * std::sqrt(count / (2.0 * count - 3.0));  // two angles a ray, less 3
     const Eigen::Matrix3d covariance =
         meeting->inverse * std::pow(std::max(options.ray_sd_rad, own), 2);
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(covariance);
     double distance_mm = 0.0;
     for (const SphereRay& ray : rays) {
       distance_mm += (meeting->at - ray.from).norm() / count;
     }
-    if (std::sqrt(eigen.eigenvalues()[2]) <= options.most_position_sd * distance_mm) {
+    if (std::sqrt(SymmetricEigenvalues(covariance)[2]) <= options.most_position_sd * distance_mm) {
       result.light.model = LightModel::kNear;
       result.light.position_mm = meeting->at;
       result.residual_rad = missed;

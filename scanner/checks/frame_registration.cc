@@ -1,10 +1,11 @@
 #include "scanner/checks/frame_registration.h"
 
-#include <Eigen/Dense>
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
+#include "core/linear_algebra.h"
 #include "scanner/checks/registration_images.h"
 
 namespace sateen {
@@ -113,10 +114,9 @@ class Level {
     }
     const double variance = sum_r2 / (sum_w * static_cast<double>(count_ - 3));
     AddRidge(variance, all.a);
-    const Eigen::LDLT<Matrix> solver(all.a);
-    const Vector theta = solver.solve(all.b);
-    const Matrix half = solver.solve(Matrix(outer.selfadjointView<Eigen::Lower>()));
-    const Matrix covariance = solver.solve(half.transpose());
+    const Vector theta = SolveSymmetric(all.a, all.b);
+    const Matrix half = SolveSymmetric(all.a, Matrix(outer.selfadjointView<Eigen::Lower>()));
+    const Matrix covariance = SolveSymmetric(all.a, Matrix(half.transpose()));
     double longest = 0.0;
     for (Eigen::Index k = 1; k < count_; ++k) {
       Eigen::Vector2d step = theta.segment<2>(kUnknowns * k);
@@ -148,11 +148,10 @@ class Level {
       l.row(k) = el.transpose() / tile.e[k];
     }
     const Eigen::Matrix3d ltl = l.transpose() * l;
-    const Eigen::LDLT<Eigen::Matrix3d> solver(ltl);
-    if (!(solver.vectorD().minCoeff() > 1e-3)) {
+    if (!(LeastPivot(ltl) > 1e-3)) {
       return false;  // lights in one plane tell of no N
     }
-    tile.n_from_v = l * solver.solve(Eigen::Matrix3d::Identity());
+    tile.n_from_v = l * InverseOfSymmetric(ltl);
     tile.p = Matrix::Identity(count_, count_) - tile.n_from_v * l.transpose();
     return true;
   }

@@ -1,11 +1,13 @@
 #include "scanner/checks/shade_check.h"
 
-#include <Eigen/Dense>
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
 #include <numeric>
+
+#include "core/linear_algebra.h"
 
 namespace sateen {
 namespace {
@@ -129,11 +131,10 @@ class ShadeFinder {
     Eigen::Vector3d n = Eigen::Vector3d::Zero();
     for (int step = 0; step < kRobustSteps; ++step) {
       const Eigen::Matrix3d a = l.transpose() * w.asDiagonal() * l;
-      const Eigen::LDLT<Eigen::Matrix3d> solver(a);
-      if (!(solver.vectorD().minCoeff() > 1e-6)) {
+      if (!(LeastPivot(a) > 1e-6)) {
         return;
       }
-      n = solver.solve(l.transpose() * w.cwiseProduct(i));
+      n = SolveSymmetric(a, Eigen::Vector3d(l.transpose() * w.cwiseProduct(i)));
       w = (i - l * n).cwiseAbs().cwiseMax(1e-3 * scale).cwiseInverse() * scale;
     }
     const Eigen::VectorXd predicted = l * n;
@@ -171,7 +172,7 @@ class ShadeFinder {
           rhs += w * y_[k][b] * x;
         }
       }
-      theta = a.selfadjointView<Eigen::Lower>().ldlt().solve(rhs);
+      theta = SolveSymmetric(a, rhs);
     }
     for (size_t k = 0; k < count_; ++k) {
       for (size_t b = 0; b < blocks_; ++b) {
@@ -206,7 +207,7 @@ class ShadeFinder {
       }
       const double ridge = 0.02 * weights * kNoise * kNoise / (kPlaneError * kPlaneError);
       a.diagonal() += Eigen::Vector3d(ridge, ridge, 1e-9);
-      plane = a.ldlt().solve(rhs);
+      plane = SolveSymmetric(a, rhs);
       plane.head<2>() = plane.head<2>().cwiseMax(-kPlaneError).cwiseMin(kPlaneError).eval();
     }
     for (size_t b = 0; b < blocks_; ++b) {
