@@ -7,6 +7,10 @@
 # BOOT_BAUD  of its bootloader: 57600 for a Nano with the old one
 # LIGHTS  of the firmware that flash uploads: 14, or 16 without flash sync and shutter
 # SECONDS  how long fuzz runs each target
+# LABEL   which tests "make test" builds and runs: all, or "release", those that depend on
+#         optimisation, SIMD or exact bits, or run the programs
+# SEEDS   for asan: few, or all of the tests that average over random draws
+# SINCE   a commit: tidy looks at modules that differ from it, without the analyzer; all modules
 JOBS ?= $(shell nproc)
 PRESET ?= ci
 PORT ?= /dev/ttyACM0
@@ -15,13 +19,16 @@ LIGHTS ?= 14
 IMAGE_14 = sateen-controller.hex
 IMAGE_16 = sateen-controller-16.hex
 SECONDS ?= 60
+LABEL ?=
+SEEDS ?= few
+SINCE ?=
 SCENES = twill-ring10 knit linen-three-rings satin-ggx knit-gloss black-velvet rib-shadows
 CTEST = ctest --output-on-failure --no-tests=error -j$(JOBS)
 # Tracked files and new ones that are not ignored.
 OUR_SOURCES = git ls-files -z --cached --others --exclude-standard '*.h' '*.cc' '*.c'
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo programs build test bench accuracy firmware flash fuzz mutants format format-check tidy asan tsan diagrams clean
+.PHONY: help setup demo programs build test bench accuracy firmware flash fuzz mutants format format-check tidy asan tsan diagrams nightly clean
 
 help:  ## This list
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 16
@@ -41,8 +48,10 @@ programs: setup  ## Build what people run, without tests and benchmarks
 	@cmake --build --preset $(PRESET) -j$(JOBS) --target sateen sateen-virtual-rig \
 	    sateen-camera-worker sateen-virtual-port sateen_firmware
 
-test: build  ## Build and run all tests
-	@$(CTEST) --test-dir build/release
+test: setup  ## Build and run all tests
+	@cmake --preset $(PRESET) --log-level=WARNING
+	@cmake --build --preset $(PRESET) -j$(JOBS) --target sateen_$(LABEL:%=%_)tests
+	@$(CTEST) --test-dir build/release $(LABEL:%=-L '^%$$')
 
 bench: build  ## Speed against error of the whole solve, then the micro-benchmarks
 	@build/release/bin/sateen bench solve
@@ -80,22 +89,26 @@ format-check: setup  ## Fail where a source is not formatted
 
 tidy: setup  ## clang-tidy over the libraries and the program
 	@cmake --preset tidy --log-level=WARNING
-	@tools/tidy build/tidy $(JOBS)
+	@tools/tidy build/tidy $(JOBS) $(SINCE)
 
-asan: setup  ## All tests under the address and undefined-behaviour sanitizers
+asan: setup  ## Build all, and run all tests under the address and undefined-behaviour sanitizers
 	@cmake --preset asan --log-level=WARNING
 	@cmake --build --preset asan -j$(JOBS)
-	@UBSAN_OPTIONS=print_stacktrace=1 LSAN_OPTIONS="suppressions=$(CURDIR)/tests/lsan.supp:print_suppressions=0" \
+	@SATEEN_SEEDS=$(SEEDS) UBSAN_OPTIONS=print_stacktrace=1 LSAN_OPTIONS="suppressions=$(CURDIR)/tests/lsan.supp:print_suppressions=0" \
 	    $(CTEST) --test-dir build/asan
 
-# By hand and not in CI: the system's oneTBB and OpenImageIO are not instrumented, and some runs
-# report how they hand work from thread to thread. Look for our own files in what it prints.
-TSAN_TESTS = sateen_core_parallel_test sateen_solver_lambertian_test sateen_scanner_stack_reader_test
-tsan: setup  ## The tests of what runs on several threads, under the thread sanitizer (not in CI)
+# The daemon and the capture have threads of their own. The system's oneTBB, on which the solver
+# runs, is not instrumented: some runs of `make tsan TSAN=solver` report how it hands over work.
+TSAN ?= daemon capture
+tsan: setup  ## The tests of the daemon and the capture under the thread sanitizer
 	@cmake --preset tsan --log-level=WARNING
-	@cmake --build --preset tsan -j$(JOBS) --target $(TSAN_TESTS)
-	@TSAN_OPTIONS="suppressions=$(CURDIR)/tests/tsan.supp" $(CTEST) --test-dir build/tsan \
-	    -R '^(core/parallel|solver/lambertian|scanner/stack_reader)_test$$'
+	@cmake --build --preset tsan -j$(JOBS) --target $(TSAN:%=sateen_%_test)
+	@for module in $(TSAN); do \
+	    TSAN_OPTIONS="suppressions=$(CURDIR)/tests/tsan.supp" $(CTEST) --test-dir build/tsan \
+	        -R "(^|/)$$module/" || exit 1; done
+
+nightly: setup  ## All that there is: every test with all seeds, tidy, benches, fuzz, threads, mutants
+	@.ci/run nightly
 
 diagrams:  ## Draw the pictures of docs/architecture.md anew; needs graphviz
 	@for name in house flows; do dot -Tsvg docs/images/$$name.dot -o docs/images/$$name.svg || exit 1; done

@@ -1,10 +1,23 @@
-# sateen_add_module(<name> SOURCES ... [PUBLIC ...] [PRIVATE ...] [TESTS ...] [TEST_LIBS ...])
+# What each of the slowest tests takes, in seconds: CTest starts the longest first, so that no core is
+# left alone with one at the end. A fresh build tree has no times of its own yet.
+file(STRINGS ${PROJECT_SOURCE_DIR}/tests/slowest.txt slowest REGEX "^[^#]")
+foreach(line IN LISTS slowest)
+  if(line MATCHES "^([^ ]+) +([0-9]+)$")
+    set(SATEEN_COST_${CMAKE_MATCH_1} ${CMAKE_MATCH_2})
+  else()
+    message(FATAL_ERROR "tests/slowest.txt: '${line}': need a test and whole seconds")
+  endif()
+endforeach()
+
+# sateen_add_module(<name> SOURCES ... [PUBLIC ...] [PRIVATE ...] [TESTS ...] [TEST_LIBS ...]
+#                   [RELEASE_TESTS])
 #
 # Declares the library sateen_<name> and its alias sateen::<name>. TESTS are files of the folder in
 # tests/ that mirrors the module's own; together they are one program, sateen_<name>_test, and each
-# is one test of CTest, "<folder>/<file>".
+# is one test of CTest, "<folder>/<file>". RELEASE_TESTS: they depend on -O3, SIMD or exact bits, or
+# run the programs, so that CI runs them in release too and not under the sanitizers alone.
 function(sateen_add_module name)
-  cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "SOURCES;PUBLIC;PRIVATE;TESTS;TEST_LIBS")
+  cmake_parse_arguments(PARSE_ARGV 1 arg "RELEASE_TESTS" "" "SOURCES;PUBLIC;PRIVATE;TESTS;TEST_LIBS")
   if(arg_UNPARSED_ARGUMENTS)
     message(FATAL_ERROR "sateen_add_module(${name}): unknown arguments ${arg_UNPARSED_ARGUMENTS}")
   endif()
@@ -24,6 +37,12 @@ function(sateen_add_module name)
       sateen::${name} ${arg_PRIVATE} ${arg_TEST_LIBS} sateen::testing GTest::gmock_main)
     sateen_set_warnings(sateen_${name}_test)
     sateen_register_tests(sateen_${name}_test ${folder} ${sources})
+    add_dependencies(sateen_tests sateen_${name}_test)
+    if(arg_RELEASE_TESTS)
+      add_dependencies(sateen_release_tests sateen_${name}_test)
+      get_property(tests DIRECTORY PROPERTY TESTS)
+      set_tests_properties(${tests} PROPERTIES LABELS release)
+    endif()
   endif()
 endfunction()
 
@@ -40,6 +59,9 @@ function(sateen_register_tests target folder)
     list(JOIN heads ":" filter)
     get_filename_component(test ${source} NAME_WE)
     add_test(NAME ${folder}/${test} COMMAND ${target} --gtest_filter=${filter})
+    if(DEFINED SATEEN_COST_${folder}/${test})
+      set_tests_properties(${folder}/${test} PROPERTIES COST ${SATEEN_COST_${folder}/${test}})
+    endif()
     list(APPEND all ${filter})
   endforeach()
   list(JOIN all ":" all)
@@ -52,6 +74,9 @@ endfunction()
 function(sateen_install_module name)
   cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "HEADERS")
   file(RELATIVE_PATH module_folder ${PROJECT_SOURCE_DIR} ${CMAKE_CURRENT_SOURCE_DIR})
+  if(SATEEN_BUILD_TESTS)
+    add_dependencies(sateen_release_tests sateen_${name})  # for install/consumer
+  endif()
   install(TARGETS sateen_${name} EXPORT sateen-targets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
   foreach(header IN LISTS arg_HEADERS)
     get_filename_component(room ${header} DIRECTORY)
