@@ -71,8 +71,8 @@ static void DimOff(void) {
 }
 
 /* Fast PWM with TOP in ICR1 (mode 14). OCR1A takes a value at once only outside PWM modes, so it is
- * written before the mode; written again in the mode, which changes nothing on silicon, it is told to
- * whoever watches a simulated timer. The count starts at TOP: the first period begins with the next
+ * written before the mode. It is written again in the mode, which changes nothing on silicon and
+ * tells a simulated timer. The count starts at TOP: the first period begins with the next
  * clock, so that every exposure sees the same phase. */
 static void DimOn(uint16_t level) {
   static const uint8_t kClock[3] = {_BV(CS10), _BV(CS11), _BV(CS11) | _BV(CS10)};

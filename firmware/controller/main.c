@@ -26,8 +26,8 @@ static void RaiseFaultOfReset(void) {
   }
 }
 
-/* Until a byte, a fault or the next millisecond. Interrupts that come between the test and the sleep
- * wake it, because sei takes effect after the next instruction. */
+/* Sleeps until a byte, a fault or the next millisecond. An interrupt between the test and the sleep
+ * wakes it, because sei takes effect after the next instruction. */
 static void SleepIfIdle(void) {
   cli();
   if (!UartWaiting() && !LightsFaultWaiting()) {

@@ -1,7 +1,7 @@
 #ifndef SATEEN_FIRMWARE_CONTROLLER_PINS_H_
 #define SATEEN_FIRMWARE_CONTROLLER_PINS_H_
 
-/* Which pin does what; read by the firmware and by the virtual rig. docs/rig.md has the wiring.
+/* Pins and their uses, for the firmware and the virtual rig. docs/rig.md has the wiring.
  *
  * Every light has an enable pin, high for on, and all share the dimming line, the output of timer 1.
  * D0 and D1 are the serial port. D13 (PB5) cannot be a light's: bootloaders blink it. So there are 14

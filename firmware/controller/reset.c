@@ -28,10 +28,10 @@ void BeforeMain(void) {
   wdt_disable();
 }
 
-/* What is left of the cause, best witness first. Optiboot from 4.6 on leaves the flags in r2, earlier
- * ones nothing. Those that clear MCUSR end by their own watchdog, so that a watchdog flag in r2 may only
- * mean that the reset line was pulled; that the main loop had been stuck decides. What this cannot see
- * is a hang with interrupts off behind such a bootloader: the cause is then unknown. */
+/* Returns the cause of the reset by the best evidence that is left. Optiboot leaves the flags in r2
+ * from version 4.6 on, and nothing before. A bootloader that clears MCUSR ends by its own watchdog. So a
+ * watchdog flag in r2 may only mean that the reset line was pulled, and whether the main loop had
+ * been stuck decides. A hang with interrupts off behind such a bootloader stays unknown. */
 static uint8_t Cause(void) {
   const uint8_t known = 0x0f;
   if (boot_mcusr & known) {

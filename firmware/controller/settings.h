@@ -1,7 +1,7 @@
 #ifndef SATEEN_FIRMWARE_CONTROLLER_SETTINGS_H_
 #define SATEEN_FIRMWARE_CONTROLLER_SETTINGS_H_
 
-/* What the EEPROM keeps. A record lies at SETTINGS_ADDRESS with a CRC-16 behind it (low byte first).
+/* Settings that the EEPROM keeps. A record lies at SETTINGS_ADDRESS with a CRC-16 behind it (low byte first).
  * Blank EEPROM gives the defaults of a new board; a damaged record gives limits that are safe for any
  * LED, and a fault. */
 
@@ -29,7 +29,7 @@ extern Settings settings;
 
 /* Returns 0 where the record is damaged. */
 uint8_t SettingsLoad(void);
-/* Writes what has changed, 3.4 ms a byte. Returns 0 where the EEPROM does not read back the same. */
+/* Writes the bytes that have changed, 3.4 ms per byte. Returns 0 where the EEPROM does not read back the same. */
 uint8_t SettingsStore(void);
 
 #endif

@@ -9,8 +9,8 @@
 #define BAUD SATEEN_BAUD
 #include <util/setbaud.h>
 
-/* Places count modulo 256, the size of the rings. A ring is empty where they are equal, so one place
- * stays free. */
+/* Positions count modulo 256, the size of the rings. A ring is empty where they are equal, so one
+ * position stays free. */
 static volatile uint8_t received[256];
 static volatile uint8_t received_head;
 static volatile uint8_t received_tail;

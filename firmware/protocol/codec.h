@@ -1,7 +1,7 @@
 #ifndef SATEEN_FIRMWARE_PROTOCOL_CODEC_H_
 #define SATEEN_FIRMWARE_PROTOCOL_CODEC_H_
 
-/* What messages.h lists, as types and functions of C99 and C++. For a message `SetLight`:
+/* The lists of messages.h as types and functions of C99 and C++. For a message `SetLight`:
  *
  *     SATEEN_SET_LIGHT                                       its id on the wire
  *     SateenSetLight                                         its fields
@@ -55,8 +55,8 @@ static inline const uint8_t* SateenGet_u32(const uint8_t* from, uint32_t* value)
 #define SATEEN_ANSWER_ID(NAME, Name, id, text) SATEEN_##NAME = (id),
 enum SateenMessage { SATEEN_REQUESTS(SATEEN_REQUEST_ID) SATEEN_ANSWERS(SATEEN_ANSWER_ID) };
 
-/* Sizes: those of structs of bytes, which have no gaps; the last byte is there because a struct needs
- * a member. */
+/* Sizes of messages as structs of bytes, which have no gaps. The last byte is there because a struct
+ * needs a member. */
 #define SATEEN_ONE_WIRE(type, name, range, text) uint8_t name[sizeof(SateenType_##type)];
 #define SATEEN_ARRAY_WIRE(type, name, count, range, text) \
   uint8_t name[(count) * sizeof(SateenType_##type)];

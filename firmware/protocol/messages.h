@@ -1,9 +1,9 @@
 #ifndef SATEEN_FIRMWARE_PROTOCOL_MESSAGES_H_
 #define SATEEN_FIRMWARE_PROTOCOL_MESSAGES_H_
 
-/* The one table of everything that the LED board and its host say to each other. The dispatch of the
- * firmware, the codec of both sides (codec.h) and docs/protocol.md are made from it, so that a
- * message is changed here and nowhere else. C99 and C++; no code, only lists for the preprocessor.
+/* The table of all messages between the LED board and its host. The dispatch of the firmware, the
+ * codec of both sides (codec.h) and docs/protocol.md are made from it, so that a message is changed
+ * here and nowhere else. C99 and C++; no code, only lists for the preprocessor.
  *
  * A list of fields names each with its type (u8, u16, u32; little-endian on the wire), its unit or
  * range, and its meaning. F is one value, A an array. Fields are sent in this order, without gaps.
@@ -82,7 +82,7 @@
   A(u16, max_level_permille, SATEEN_MAX_CHANNELS, "0 ... 1000", "of each light")                   \
   A(u16, max_on_ms, SATEEN_MAX_CHANNELS, "1 ... 60000", "of each light")
 
-/* What the outputs do now. */
+/* State of the outputs. */
 #define SATEEN_STATE_FIELDS(F, A)                                                      \
   F(u8, request, "message id", "of the command that this answers; 0 if none")          \
   F(u8, result, "result number", "0: done; else nothing was changed")                  \
@@ -187,7 +187,7 @@
   X(BROWN_OUT, 0x04, "the supply voltage fell too low")                          \
   X(WATCHDOG, 0x08, "the watchdog")
 
-/* What can be wrong with a frame. NONE and GOOD are no problems: more bytes are needed, and it is
+/* Outcomes of receiving a frame. NONE and GOOD are no problems: more bytes are needed, and it is
  * whole. */
 #define SATEEN_FRAME_STATUSES(X)                                    \
   X(NONE, 0, "no frame has ended yet")                              \
