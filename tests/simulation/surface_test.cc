@@ -125,6 +125,14 @@ TEST(Weave, FloatsAreAsLongAsThePatternSays) {
   for (int j = 0; j < 8; ++j) {  // the diagonal goes up to the right
     EXPECT_EQ(twill->At(0.5, j + 0.5).part, twill->At(1.5, j + 1.5).part);
   }
+  const SurfacePtr satin = Made(MakeWeave({.pattern = WeavePattern::kSatin}));
+  for (int j = 0; j < 10; ++j) {  // where the weft is on top once, no neighbour has it there
+    if (satin->At(0.5, j + 0.5).part != 0) {
+      for (const double beside : {-1.0, 0.0, 1.0}) {
+        EXPECT_EQ(satin->At(1.5, j + beside + 0.5).part, 0);
+      }
+    }
+  }
 }
 
 TEST(Trace, HitsEverySurfaceWhereItIs) {
