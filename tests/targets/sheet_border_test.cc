@@ -18,6 +18,12 @@ TEST(SheetBorder, ReadsWhatTextWrites) {
 }
 
 // Clockwise from the top left, 5 mm from the edge, none over another, the inside free of them.
+// Behind the last marker of a row there is no gap: without it 11 would fit along the short side.
+TEST(SheetBorder, AsManyMarkersAsFitStandAlongASide) {
+  const SheetBorder border = ParseSheetBorder("sheet:A4:12mm").value();
+  EXPECT_EQ(border.MarkerCenters().size(), 2U * 17U + 2U * 10U);
+}
+
 TEST(SheetBorder, MarkersStandAlongTheRim) {
   const SheetBorder border = ParseSheetBorder("sheet:200x150mm:10mm").value();
   const std::vector<Eigen::Vector3d> at = border.MarkerCenters();
