@@ -1,5 +1,6 @@
 #include "cli/capture.h"
 
+#include <CLI/CLI.hpp>
 #include <chrono>
 #include <ostream>
 #include <utility>

@@ -1,10 +1,10 @@
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <filesystem>
 #include <iosfwd>
 #include <string>
 
+#include "cli/command.h"
 #include "core/task.h"
 #include "scanner/capture/capture_request.h"
 #include "scanner/daemon/http_client.h"

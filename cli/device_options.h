@@ -1,31 +1,17 @@
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <optional>
 
+#include "cli/command.h"
 #include "scanner/daemon/http_client.h"
 #include "scanner/devices/rig_devices.h"
 
 namespace sateen::cli {
 
-// --port and --camera.
-inline void AddDeviceOptions(CLI::App& cmd, RigDeviceNames& devices) {
-  cmd.add_option("--port", devices.port,
-                 "Serial port of the LED board, as /dev/ttyACM0; default: the one whose USB id is "
-                 "an Arduino's")
-      ->envname("SATEEN_PORT");
-  cmd.add_option("--camera", devices.camera,
-                 "Camera: usb:BUS,DEVICE, ptpip:ADDRESS, or folder:DIR for files that another "
-                 "program drops; default: the only one on USB")
-      ->envname("SATEEN_CAMERA");
-}
+// Adds --port and --camera.
+void AddDeviceOptions(CLI::App& cmd, RigDeviceNames& devices);
 
-// The daemon that is running, unless a device is named.
-inline Result<std::optional<DaemonClient>> DaemonFor(const RigDeviceNames& devices) {
-  if (!devices.port.empty() || !devices.camera.empty()) {
-    return std::optional<DaemonClient>();
-  }
-  return FindDaemon();
-}
+// Finds the daemon that is running; nothing where a device is named.
+[[nodiscard]] Result<std::optional<DaemonClient>> DaemonFor(const RigDeviceNames& devices);
 
 }  // namespace sateen::cli

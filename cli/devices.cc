@@ -1,5 +1,6 @@
 #include "cli/devices.h"
 
+#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <optional>
 #include <ostream>

@@ -1,12 +1,12 @@
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <functional>
 #include <iosfwd>
 #include <memory>
 #include <string>
 #include <vector>
 
+#include "cli/command.h"
 #include "core/task.h"
 #include "scanner/devices/find_camera.h"
 #include "scanner/devices/serial_port.h"

@@ -1,5 +1,6 @@
 #include "cli/light.h"
 
+#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <charconv>
 #include <functional>

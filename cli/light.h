@@ -1,12 +1,12 @@
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <filesystem>
 #include <iosfwd>
 #include <memory>
 #include <optional>
 #include <string>
 
+#include "cli/command.h"
 #include "core/task.h"
 #include "scanner/daemon/http_client.h"
 #include "scanner/devices/byte_port.h"

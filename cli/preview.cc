@@ -1,5 +1,6 @@
 #include "cli/preview.h"
 
+#include <CLI/CLI.hpp>
 #include <ostream>
 
 #include "cli/device_options.h"

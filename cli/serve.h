@@ -1,11 +1,11 @@
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <filesystem>
 #include <iosfwd>
 #include <memory>
 #include <string>
 
+#include "cli/command.h"
 #include "core/task.h"
 #include "scanner/capture/capture_options.h"
 #include "scanner/devices/rig_devices.h"

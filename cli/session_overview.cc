@@ -1,5 +1,6 @@
 #include "cli/session_overview.h"
 
+#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <nlohmann/json.hpp>
 #include <ostream>

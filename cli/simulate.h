@@ -1,9 +1,9 @@
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <filesystem>
 #include <iosfwd>
 
+#include "cli/command.h"
 #include "core/task.h"
 
 namespace sateen::cli {

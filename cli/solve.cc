@@ -1,5 +1,6 @@
 #include "cli/solve.h"
 
+#include <CLI/CLI.hpp>
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <chrono>

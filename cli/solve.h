@@ -1,12 +1,12 @@
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <filesystem>
 #include <iosfwd>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "cli/command.h"
 #include "core/task.h"
 #include "scanner/sessions/dataset.h"
 #include "solver/evaluate.h"

@@ -1,5 +1,6 @@
 #include "cli/bench/bench_accuracy.h"
 
+#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
 #include <functional>

@@ -1,5 +1,6 @@
 #include "cli/bench/bench_calibrate.h"
 
+#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>
 #include <nlohmann/json.hpp>

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <filesystem>
 #include <iosfwd>
 #include <map>
@@ -8,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "cli/command.h"
 #include "core/task.h"
 #include "imaging/image.h"
 #include "pipelines/calibrate/predicted_errors.h"

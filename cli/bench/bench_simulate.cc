@@ -1,5 +1,6 @@
 #include "cli/bench/bench_simulate.h"
 
+#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>
 #include <filesystem>

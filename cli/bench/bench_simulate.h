@@ -1,11 +1,11 @@
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <filesystem>
 #include <iosfwd>
 #include <string>
 #include <vector>
 
+#include "cli/command.h"
 #include "core/task.h"
 #include "solver/evaluate.h"
 

@@ -1,5 +1,6 @@
 #include "cli/bench/bench_solve.h"
 
+#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <array>
 #include <ostream>

@@ -1,5 +1,6 @@
 #include "cli/calibrate/calibrate_check.h"
 
+#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>
 #include <limits>

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <filesystem>
 #include <iosfwd>
 #include <map>
@@ -8,6 +7,7 @@
 #include <vector>
 
 #include "calibration/check/light_check.h"
+#include "cli/command.h"
 #include "core/task.h"
 #include "scanner/sessions/sheet_reader.h"
 

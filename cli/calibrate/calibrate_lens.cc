@@ -1,5 +1,6 @@
 #include "cli/calibrate/calibrate_lens.h"
 
+#include <CLI/CLI.hpp>
 #include <chrono>
 #include <cmath>
 #include <nlohmann/json.hpp>

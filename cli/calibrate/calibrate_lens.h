@@ -1,6 +1,5 @@
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <filesystem>
 #include <iosfwd>
 #include <map>
@@ -9,6 +8,7 @@
 #include <vector>
 
 #include "calibration/lens/lens.h"
+#include "cli/command.h"
 #include "core/task.h"
 #include "pipelines/calibrate/rig_calibration.h"
 #include "rig/rig.h"

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <filesystem>
 #include <iosfwd>
 #include <map>
@@ -9,6 +8,7 @@
 #include <vector>
 
 #include "calibration/lights/light_fit.h"
+#include "cli/command.h"
 #include "core/task.h"
 #include "pipelines/calibrate/calibrate_lights_compare.h"
 #include "pipelines/calibrate/rig_calibration.h"

@@ -1,5 +1,6 @@
 #include "cli/calibrate/calibrate_response.h"
 
+#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>
 #include <cmath>

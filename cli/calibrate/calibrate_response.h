@@ -1,6 +1,5 @@
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <filesystem>
 #include <iosfwd>
 #include <map>
@@ -8,6 +7,7 @@
 #include <string>
 
 #include "calibration/response/response_fit.h"
+#include "cli/command.h"
 #include "core/task.h"
 #include "pipelines/calibrate/rig_calibration.h"
 #include "rig/rig.h"

@@ -1,5 +1,6 @@
 #include "cli/calibrate/calibrate_spheres.h"
 
+#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>
 #include <cmath>

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <filesystem>
 #include <iosfwd>
 #include <map>
@@ -9,6 +8,7 @@
 #include <vector>
 
 #include "calibration/spheres/spheres.h"
+#include "cli/command.h"
 #include "core/task.h"
 #include "rig/rig.h"
 

@@ -1,11 +1,10 @@
-#include "cli/board.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <filesystem>
 
 #include "calibration/print/board_find.h"
+#include "cli/board_print.h"
 #include "targets/page.h"
 #include "tests/calibration/test_pictures.h"
 #include "tests/cli/cli_runner.h"
@@ -20,8 +19,8 @@ using sateen::testing::TempFolder;
 using ::testing::HasSubstr;
 
 RunResult Board(std::vector<std::string> words) {
-  words.insert(words.begin(), {"board", "print"});
-  return sateen::testing::RunCommand<cli::BoardPrintArgs>(std::move(words), cli::AddBoard,
+  words.insert(words.begin(), "print");
+  return sateen::testing::RunCommand<cli::BoardPrintArgs>(std::move(words), cli::AddBoardPrint,
                                                           cli::RunBoardPrint);
 }
 

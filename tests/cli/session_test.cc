@@ -1,9 +1,8 @@
-#include "cli/session.h"
-
 #include <gmock/gmock.h>
 
 #include <algorithm>
 
+#include "cli/session_verify.h"
 #include "core/sha256.h"
 #include "tests/cli/cli_runner.h"
 #include "tests/scanner/sessions/dataset_files.h"
@@ -16,13 +15,10 @@ using testing::RunResult;
 using testing::TempFolder;
 
 RunResult Verify(const std::vector<std::string>& words) {
-  std::vector<std::string> all = {"session", "verify"};
+  std::vector<std::string> all = {"verify"};
   all.insert(all.end(), words.begin(), words.end());
-  return testing::RunCommand<cli::SessionArgs>(
-      all, cli::AddSession,
-      [](const cli::SessionArgs& args, const Task& task, std::ostream& out, std::ostream& log) {
-        return cli::RunSessionVerify(args.verify, task, out, log);
-      });
+  return testing::RunCommand<cli::SessionVerifyArgs>(all, cli::AddSessionVerify,
+                                                     cli::RunSessionVerify);
 }
 
 // A session with the hashes of its frames.

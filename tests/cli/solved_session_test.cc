@@ -1,6 +1,6 @@
 #include <gmock/gmock.h>
 
-#include "cli/session.h"
+#include "cli/session_overview.h"
 #include "imaging/image_io.h"
 #include "tests/cli/cli_runner.h"
 #include "tests/testing/files.h"
@@ -48,12 +48,9 @@ class SolvedSession : public ::testing::Test {
     return (folder_.Path() / name).string();
   }
   [[nodiscard]] RunResult Overview(const std::string& session, const std::string& maps) const {
-    return testing::RunCommand<cli::SessionArgs>(
-        {"session", "overview", Path(session), "--maps", Path(maps), "-o", Path("sheet.png")},
-        cli::AddSession,
-        [](const cli::SessionArgs& args, const Task& task, std::ostream& out, std::ostream& log) {
-          return cli::RunSessionOverview(args.overview, task, out, log);
-        });
+    return testing::RunCommand<cli::SessionOverviewArgs>(
+        {"overview", Path(session), "--maps", Path(maps), "-o", Path("sheet.png")},
+        cli::AddSessionOverview, cli::RunSessionOverview);
   }
 
  private:

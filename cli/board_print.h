@@ -1,10 +1,10 @@
 #pragma once
 
-#include <CLI/CLI.hpp>
 #include <filesystem>
 #include <iosfwd>
 #include <string>
 
+#include "cli/command.h"
 #include "core/task.h"
 
 namespace sateen::cli {
@@ -18,7 +18,7 @@ struct BoardPrintArgs {
   bool json = false;
 };
 
-void AddBoard(CLI::App& app, BoardPrintArgs& args);
+void AddBoardPrint(CLI::App& board, BoardPrintArgs& args);
 
 // Returns the exit status.
 int RunBoardPrint(const BoardPrintArgs& args, const Task& task, std::ostream& out,

@@ -1,5 +1,6 @@
-#include "cli/session.h"
+#include "cli/session_verify.h"
 
+#include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 #include <ostream>
 
@@ -7,23 +8,13 @@
 
 namespace sateen::cli {
 
-void AddSession(CLI::App& root, SessionArgs& args) {
-  CLI::App* session = root.add_subcommand("session", "Look after sessions on disk");
-  session->require_subcommand(1);
-  CLI::App* verify = session->add_subcommand(
+void AddSessionVerify(CLI::App& session, SessionVerifyArgs& args) {
+  CLI::App* cmd = session.add_subcommand(
       "verify",
       "Prove a session whole: its record, its journal and its rig agree, every light has its frame "
       "and every file its hash; exit status 3 where not, with all that is wrong");
-  verify->add_option("session", args.verify.session, "Folder of the session")->required();
-  verify->add_flag("--json", args.verify.json, "Print JSON");
-  AddSessionOverview(*session, args.overview);
-}
-
-int RunSession(const CLI::App& root, const SessionArgs& args, const Task& task, std::ostream& out,
-               std::ostream& log) {
-  return root.get_subcommand("session")->got_subcommand("verify")
-             ? RunSessionVerify(args.verify, task, out, log)
-             : RunSessionOverview(args.overview, task, out, log);
+  cmd->add_option("session", args.session, "Folder of the session")->required();
+  cmd->add_flag("--json", args.json, "Print JSON");
 }
 
 int RunSessionVerify(const SessionVerifyArgs& args, const Task& task, std::ostream& out,

@@ -1,5 +1,6 @@
-#include "cli/board.h"
+#include "cli/board_print.h"
 
+#include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 #include <ostream>
 
@@ -72,10 +73,8 @@ std::string JsonReport(const BoardPrintArgs& args, const Page& page) {
 
 }  // namespace
 
-void AddBoard(CLI::App& app, BoardPrintArgs& args) {
-  CLI::App* board = app.add_subcommand("board", "Boards and sheets for calibration");
-  board->require_subcommand(1);
-  CLI::App* print = board->add_subcommand(
+void AddBoardPrint(CLI::App& board, BoardPrintArgs& args) {
+  CLI::App* print = board.add_subcommand(
       "print", "Draw a board, or a sheet with a marker border, to be printed in its size");
   print
       ->add_option("target", args.spec,
