@@ -12,6 +12,7 @@
 
 #include "cli/solve_report.h"
 #include "core/output_folder.h"
+#include "imaging/encoding_name.h"
 #include "imaging/image_io.h"
 #include "pipelines/solve/maps.h"
 #include "pipelines/solve/mosaic_maps.h"
@@ -50,7 +51,7 @@ ReadDatasetOptions ReadOptionsOf(const SolveArgs& args) {
   options.domain = DomainNamed(args);
   options.by_noise = LadderModeNamed(args.robust).has_value();
   options.scratch_dir = args.output;
-  options.encoding = EncodingNamed(args.encoding);
+  options.encoding = *EncodingNamed(args.encoding);
   if (!args.rig_file.empty()) {
     options.rig_file = args.rig_file;
   }
@@ -391,13 +392,6 @@ Result<SolveOutcome> SolveCapture(const SolveArgs& args, const Task& task, std::
 }
 
 }  // namespace
-
-Encoding EncodingNamed(const std::string& name) {
-  if (name == "linear") {
-    return Encoding::kLinear;
-  }
-  return name == "srgb" ? Encoding::kSrgb : Encoding::kAuto;
-}
 
 bool Passed(const SolveArgs& args, const SolveOutcome& outcome) {
   // Not "above", so that NaN does not pass.

@@ -61,9 +61,6 @@ struct SolveOutcome {
 // Whether the mean angular error is within args.fail_above_deg; true where that is not given.
 [[nodiscard]] bool Passed(const SolveArgs& args, const SolveOutcome& outcome);
 
-// "linear", "srgb" or "auto".
-[[nodiscard]] Encoding EncodingNamed(const std::string& name);
-
 void AddSolve(CLI::App& root, SolveArgs& args);
 // Returns the program's exit status. Results go to `out`, warnings and errors to `log`.
 int RunSolve(const SolveArgs& args, const Task& task, std::ostream& out, std::ostream& log);

@@ -116,6 +116,13 @@ Status CheckPose(const Eigen::Isometry3d& pose, std::string_view what) {
 
 }  // namespace
 
+bool Camera::operator==(const Camera& other) const {
+  return model == other.model && size_px == other.size_px && fx == other.fx && fy == other.fy &&
+         cx == other.cx && cy == other.cy && distortion == other.distortion &&
+         table_from_camera.matrix() == other.table_from_camera.matrix() &&
+         has_pose == other.has_pose;
+}
+
 Status Camera::Validate(std::string_view what) const {
   if (size_px.width < 1 || size_px.height < 1 || size_px.width > kMaxSizePx ||
       size_px.height > kMaxSizePx) {

@@ -31,6 +31,8 @@ struct Camera {
 
   // Names the first field that is out of range, with its value and its range.
   [[nodiscard]] Status Validate(std::string_view what) const;
+
+  bool operator==(const Camera& other) const;
 };
 
 // Where the table point appears, by equations (1) to (4). The point must lie before the camera.

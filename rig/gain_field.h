@@ -41,6 +41,8 @@ struct GainField {
   // kBadData names the first field out of range: finite numbers, spacing > 0, 4 to kMostFieldKnots
   // columns and rows, as many gains, each above 0 and up to 100. `what` opens the message.
   [[nodiscard]] Status Validate(std::string_view what) const;
+
+  bool operator==(const GainField&) const = default;
 };
 
 /// Where the ray from a light through x meets the table plane z = 0. A lamp that is small beside its

@@ -27,16 +27,17 @@ struct Light {
   Eigen::Vector3d direction = Eigen::Vector3d::UnitZ();
   // kNear and above: where the light is.
   Eigen::Vector3d position_mm = Eigen::Vector3d::Zero();
-  // kLed and above: unit vector along which it shines, and the exponent mu, 0 to 50, of its angular fall-off.
+  // kLed and above: unit vector along which it shines, and the exponent mu of its angular
+  // fall-off, 0 to 50.
   Eigen::Vector3d axis = -Eigen::Vector3d::UnitZ();
   double anisotropy = 0.0;
   // kLedField: what the led's law is multiplied by, over the table.
   GainField field;
   // kDistant: irradiance; otherwise the irradiance at 1 m on the axis. Red, green, blue; > 0.
   Eigen::Vector3d flux_rgb = Eigen::Vector3d::Ones();
-  // Standard deviations, where a calibration found them: along the table's axes (kNear and above); of
-  // the angle to the true direction (kDistant), root mean square; of the irradiance in the middle of the
-  // table, relative, whatever flux and position owe to each other. All >= 0.
+  // Standard deviations, where a calibration found them, all >= 0: along the table's axes (kNear
+  // and above); of the angle to the true direction (kDistant), root mean square; of the irradiance in
+  // the middle of the table, relative, with the covariance of flux and position.
   std::optional<Eigen::Vector3d> position_sd_mm;
   std::optional<double> direction_sd_deg;
   std::optional<double> irradiance_sd;
@@ -44,11 +45,13 @@ struct Light {
   // Names the first field that is out of range, with its value and its range. `what` names the
   // light in the message ("lights.txt: light 3").
   [[nodiscard]] Status Validate(std::string_view what) const;
+
+  bool operator==(const Light&) const = default;
 };
 
 using Lights = std::vector<Light>;
 
-// What one light does at one point.
+// Light that arrives at one point from one light.
 struct Incident {
   Eigen::Vector3d l;      // unit vector towards the light
   Eigen::Vector3d e_rgb;  // irradiance on a surface that faces the light

@@ -7,6 +7,7 @@
 
 #include "core/json.h"
 #include "core/linear_algebra.h"
+#include "rig/calibration_json.h"
 #include "rig/light_json.h"
 
 namespace sateen {
@@ -97,8 +98,9 @@ nlohmann::ordered_json ResponseToJson(const Response& response) {
 }
 
 // On one line; a name that is not UTF-8 must not end the run.
-std::string Line(const nlohmann::ordered_json& json) {
-  return json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+template <typename AnyJson>
+std::string Line(const AnyJson& json) {
+  return json.dump(-1, ' ', false, AnyJson::error_handler_t::replace);
 }
 
 Status CheckResponse(const Response& response, std::string_view what) {
@@ -175,10 +177,6 @@ Status Rig::Validate(std::string_view what) const {
   }
   if (status && response) {
     status = CheckResponse(*response, what);
-  }
-  if (status && !calibration_json.empty() &&
-      !Json::parse(calibration_json, nullptr, /*allow_exceptions=*/false).is_object()) {
-    return Fail(ErrorCode::kBadData, "{}: calibration is not a JSON object; need one", what);
   }
   return status.and_then([&] { return CheckLights(lights, camera, what); });
 }
@@ -272,7 +270,7 @@ Result<Rig> ReadRig(const std::filesystem::path& path) {
     rig.lights.push_back(*std::move(light));
   }
   if (reader.OptionalObject("calibration")) {
-    rig.calibration_json = file->at("calibration").dump();
+    rig.calibration = ReadCalibrationRecords(file->at("calibration"));
   }
   if (Status status = reader.Finish().and_then([&] { return rig.Validate(what); }); !status) {
     return tl::unexpected(status.error());
@@ -295,8 +293,8 @@ std::string RigToJson(const Rig& rig) {
   members.push_back(lights.empty()
                         ? R"(  "lights": [])"
                         : fmt::format("  \"lights\": [\n{}\n  ]", fmt::join(lights, ",\n")));
-  if (!rig.calibration_json.empty()) {
-    members.push_back("  \"calibration\": " + rig.calibration_json);
+  if (rig.calibration != CalibrationRecords()) {
+    members.push_back("  \"calibration\": " + Line(ToJson(rig.calibration)));
   }
   return fmt::format("{{\n{}\n}}\n", fmt::join(members, ",\n"));
 }

@@ -9,13 +9,13 @@
 #include <utility>
 
 #include "cli/bench/peak_memory.h"
-#include "cli/calibrate/calibrate_lights.h"
 #include "cli/simulate.h"
 #include "cli/solve.h"
 #include "core/output_folder.h"
 #include "core/parallel.h"
 #include "core/scratch_folder.h"
 #include "imaging/raw.h"
+#include "pipelines/calibrate/calibrate_lights.h"
 #include "simulation/rigs.h"
 
 namespace sateen::cli {
@@ -177,40 +177,24 @@ class CalibrateBench {
 
   Status Calibrate(const std::string& label, int sheets, const std::string& output) {
     task_.BeginStage("calibrating from " + label, 1);
-    CalibrateLightsArgs args{.output = Path(output),
-                             .rough_rig = Path("ruler.json"),
-                             .threads = args_.threads,
-                             .json = true};
+    CalibrateLightsOptions options{.output = Path(output), .rough_rig = Path("ruler.json")};
     for (int sheet = 0; sheet < sheets; ++sheet) {
-      args.sheets.emplace_back(Path(SheetName(sheet)));
+      options.sheets.emplace_back(Path(SheetName(sheet)));
     }
     ResetPeakMemory();
-    const Result<json> done = Command(RunCalibrateLights, args);
+    const Result<LightsCalibration> done = CalibrateLightsFromSheets(options, Quiet());
     if (!done) {
       return tl::unexpected(done.error());
     }
-    CalibrateRow row{.sheets = label,
-                     .seconds = done->at("seconds").get<double>(),
-                     .peak_memory_gb = PeakMemoryGb()};
-    for (const json& light : done->at("lights")) {
-      row.position_mm = std::max(row.position_mm, light.at("position_error_mm").get<double>());
-      row.direction_deg =
-          std::max(row.direction_deg, light.at("direction_error_deg").get<double>());
-      row.flux = std::max(row.flux, light.at("flux_error").get<double>());
+    CalibrateRow row{.sheets = label, .seconds = done->seconds, .peak_memory_gb = PeakMemoryGb()};
+    for (const LightFigures& light : done->lights) {
+      row.position_mm = std::max(row.position_mm, light.position_error_mm.value());
+      row.direction_deg = std::max(row.direction_deg, light.direction_error_deg.value());
+      row.flux = std::max(row.flux, light.flux_error.value());
     }
-    row.flat_deg = FlatnessOfFit(*done);
+    row.flat_deg = done->ways.back().flat_deg.value_or(0.0);
     report_.rows.push_back(std::move(row));
     return {};
-  }
-
-  // Of the last of the ways that calibrate lights compares, its own.
-  static double FlatnessOfFit(const json& done) {
-    const auto ways = done.find("ways");
-    if (ways == done.end() || ways->empty() || !ways->back().contains("flat_sheet_deg")) {
-      return 0.0;
-    }
-    const json& flat = ways->back().at("flat_sheet_deg");
-    return flat.is_number() ? flat.get<double>() : 0.0;
   }
 
   Status SolveFabric() {

@@ -1,38 +1,17 @@
 #pragma once
 
-#include <filesystem>
 #include <iosfwd>
-#include <map>
-#include <string>
-#include <vector>
 
-#include "calibration/check/light_check.h"
 #include "cli/command.h"
 #include "core/task.h"
-#include "scanner/sessions/sheet_reader.h"
+#include "pipelines/calibrate/calibrate_check.h"
 
 namespace sateen::cli {
 
 struct CalibrateCheckArgs {
-  std::vector<std::filesystem::path> sheets;
-  std::filesystem::path rig;     // empty: the session's own
-  std::string border;            // what is printed on the sheets; empty: nothing
-  std::filesystem::path output;  // folder for pictures and the report; empty: none
-  LightCheckOptions options;
-  double max_ambient_percent = 5.0;  // of the dimmest light
+  CalibrationCheckOptions options;
   int threads = 0;
   bool json = false;
-};
-
-// Everything that a report speaks of.
-struct CalibrationCheck {
-  Rig rig;
-  RigCheck check;
-  std::vector<std::string> faults;  // what does not hold, each with what to do
-  std::vector<std::string> notes;   // what is no fault but worth knowing
-  double ambient_percent = 0.0;     // the dark frame over the dimmest light
-  std::map<std::string, std::string> sha256_of_input;
-  double seconds = 0.0;
 };
 
 void AddCalibrateCheck(CLI::App& calibrate, CalibrateCheckArgs& args);

@@ -2,162 +2,139 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <chrono>
 #include <cmath>
-#include <nlohmann/json.hpp>
-#include <ostream>
-#include <utility>
+#include <limits>
 
-#include "cli/calibrate/calibrate_response_pictures.h"
-#include "cli/calibrate/calibrate_response_report.h"
-#include "core/sha256.h"
-#include "pipelines/calibrate/rig_record.h"
-#include "scanner/sessions/files/chart_file.h"
+#include "cli/calibrate/calibration_report.h"
+#include "core/angle.h"
 
 namespace sateen::cli {
 namespace {
 
-namespace fs = std::filesystem;
+constexpr std::array<std::string_view, 3> kChannelNames = {"red", "green", "blue"};
 
-bool AreFluxesMeasured(const Rig& rig) {
-  return !rig.calibration_json.empty() &&
-         nlohmann::json::parse(rig.calibration_json, nullptr, /*allow_exceptions=*/false)
-             .contains("lights");
+std::string LinearityText(const ResponseCalibration& result) {
+  std::string text =
+      fmt::format("\n{:<10}{:>8}{:>16}{:>16}{:>17} [DN]\n", "linear", "from",
+                  fmt::format("to, {:g} %", 100.0 * result.tolerance),
+                  fmt::format("to, {:g} %", 100.0 * kFineTolerance), "saturated from");
+  const auto dn = [](const std::optional<double>& value, std::string_view none) {
+    return value ? fmt::format("{:.0f}", *value) : std::string(none);
+  };
+  bool is_open = false;
+  double sheets_dn = std::numeric_limits<double>::infinity();
+  for (size_t c = 0; c < 3; ++c) {
+    const ChannelLinearity& channel = result.fit.linearity.rgb[c];
+    is_open = is_open || !channel.departs;
+    sheets_dn = std::min(sheets_dn, channel.fine_to_dn.value_or(0.0));
+    text +=
+        fmt::format("  {:<8}{:>8.0f}{:>16}{:>16}{:>17}\n", kChannelNames[c], channel.linear_from_dn,
+                    fmt::format("{}{:.0f}", channel.departs ? "" : "> ", channel.linear_to_dn),
+                    dn(channel.fine_to_dn, "not known"), dn(channel.saturation_dn, "not seen"));
+  }
+  if (is_open) {
+    text += "  >: no patch tells of what is brighter\n";
+  }
+  if (sheets_dn > 0.0) {
+    text += fmt::format(
+        "  expose white paper to half or two thirds of white, at most to {:.0f} DN\n", sheets_dn);
+  }
+  return text;
 }
 
-// What a light's flux says of its balance, in the units of the response that it is given in.
-Eigen::Vector3d BalanceOf(const Light& light, const Eigen::Vector3d& response_balance) {
-  return (light.flux_rgb[1] / response_balance[1]) * response_balance.cwiseQuotient(light.flux_rgb);
-}
-
-Result<std::optional<ResponseErrors>> ErrorsOf(const fs::path& dir, const ResponseFit& fit,
-                                               const Rig& rig) {
-  const Result<std::optional<Rig>> truth = ReadTrueRig(dir);
-  if (!truth) {
-    return tl::unexpected(truth.error());
-  }
-  if (!*truth || !(*truth)->response) {
-    return std::optional<ResponseErrors>();
-  }
-  const Lights& lights = (*truth)->lights;
-  const Response& expected = *(*truth)->response;
-  ResponseErrors errors;
-  for (size_t k = 0; k < fit.lights.size(); ++k) {
-    const auto light = std::ranges::find(lights, rig.lights[k].name, &Light::name);
-    if (fit.lights[k] && light != lights.end()) {
-      const Eigen::Vector3d off =
-          fit.lights[k]->white_balance.cwiseQuotient(BalanceOf(*light, expected.white_balance));
-      errors.white_balance =
-          std::max(errors.white_balance, (off - Eigen::Vector3d::Ones()).cwiseAbs().maxCoeff());
+std::string BalanceText(const ResponseCalibration& result) {
+  std::string text = "\nwhite balance      red      +-    blue      +-  patches\n";
+  const auto row = [](std::string_view name, const Eigen::Vector3d& value,
+                      const Eigen::Vector3d& sd) {
+    return fmt::format("  {:<12} {:>8.4f} {:>7.4f} {:>7.4f} {:>7.4f}", name, value[0], sd[0],
+                       value[2], sd[2]);
+  };
+  for (size_t k = 0; k < result.fit.lights.size(); ++k) {
+    if (const std::optional<LightBalance>& balance = result.fit.lights[k]) {
+      text += fmt::format("{} {:>8}\n",
+                          row(result.rig.lights[k].name, balance->white_balance, balance->sd),
+                          balance->patches);
     }
   }
-  if (fit.transfer && expected.gain_dn_per_electron && expected.read_noise_dn) {
-    errors.gain =
-        std::abs(fit.transfer->gain_dn_per_electron / *expected.gain_dn_per_electron - 1.0);
-    errors.read_noise = std::abs(fit.transfer->read_noise_dn / *expected.read_noise_dn - 1.0);
-  }
-  if (fit.saturation_dn) {
-    errors.saturation =
-        std::abs((*fit.saturation_dn - expected.black) / (expected.white - expected.black) - 1.0);
-  }
-  return std::optional(errors);
+  return text + row("all", result.fit.white_balance, result.fit.white_balance_sd) + "\n\n";
 }
 
-Result<ResponseCalibration> Calibrate(const CalibrateResponseArgs& args, const Task& task) {
-  const auto start = std::chrono::steady_clock::now();
-  const Result<Chart> chart = ReadChartFile(args.patches);
-  if (!chart) {
-    return tl::unexpected(chart.error());
+std::string NoiseText(const ResponseFit& fit) {
+  if (!fit.transfer) {
+    return "";
   }
-  const Result<std::string> chart_hash = Sha256OfFile(args.patches);
-  if (!chart_hash) {
-    return tl::unexpected(chart_hash.error());
+  const PhotonTransfer& transfer = *fit.transfer;
+  return fmt::format(
+      "gain        {:.5f} +- {:.5f} DN per electron; full well {:.0f} electrons\n"
+      "read noise  {:.3f} +- {:.3f} DN, {:.2f} electrons\n",
+      transfer.gain_dn_per_electron, transfer.gain_sd,
+      (fit.saturation_dn.value_or(fit.white_dn) - fit.black_dn) / transfer.gain_dn_per_electron,
+      transfer.read_noise_dn, transfer.read_noise_sd,
+      transfer.read_noise_dn / transfer.gain_dn_per_electron);
+}
+
+std::string ErrorsText(const ResponseErrors& errors) {
+  const auto percent = [](const std::optional<double>& error) {
+    return error ? fmt::format("{:.3g} %", 100.0 * *error) : std::string("unknown");
+  };
+  return fmt::format(
+      "error against truth/rig.json: white balance {} at most, gain {}, read noise {}, saturation "
+      "{}\n",
+      percent(errors.white_balance), percent(errors.gain), percent(errors.read_noise),
+      percent(errors.saturation));
+}
+
+std::string TextReport(const ResponseCalibration& result) {
+  const ResponseFit& fit = result.fit;
+  const ChartReadings& readings = result.capture.readings;
+  const Eigen::Isometry2d& pose = result.capture.pose.table_from_chart;
+  std::string text = fmt::format(
+      "chart       {} patches at ({:.1f}, {:.1f}) mm, turned by {:.1f} degrees; {} frames\n"
+      "black       {:.2f} DN; the files say {:g}\n"
+      "white       {:.0f} DN, from where readings do not count; the files say {:g}\n",
+      readings.patches.size(), pose.translation().x(), pose.translation().y(),
+      Eigen::Rotation2Dd(pose.linear()).angle() / kRadPerDeg, readings.frames.size(), fit.black_dn,
+      readings.file_black_dn, fit.white_dn, readings.file_white_dn);
+  text += NoiseText(fit) + LinearityText(result) + BalanceText(result);
+  if (result.errors) {
+    text += ErrorsText(*result.errors);
   }
-  ReadChartOptions options{.find = args.find};
-  options.rig_file = RigFileToBeginWith(args.rig, args.output);
-  Result<ChartSession> capture = ReadChart(args.chart, *chart, options, task);
-  if (!capture) {
-    return tl::unexpected(capture.error());
-  }
-  Result<ResponseFit> fit = FitResponse(capture->readings, args.fit);
-  if (!fit) {
-    return Fail(fit.error().code, "{}: {}", args.chart.string(), fit.error().message);
-  }
-  ResponseCalibration result;
-  result.rig = capture->rig;
-  result.sha256_of_input = capture->sha256_of_input;
-  result.sha256_of_input[args.patches.string()] = *chart_hash;
-  result.warnings = fit->warnings;
-  result.capture = std::move(*capture);
-  result.fit = std::move(*fit);
-  result.tolerance = args.fit.linearity.tolerance;
-  AdoptResponse(result.fit, result.rig);
-  const Result<std::optional<ResponseErrors>> errors = ErrorsOf(args.chart, result.fit, result.rig);
-  if (!errors) {
-    return tl::unexpected(errors.error());
-  }
-  result.errors = *errors;
-  result.pictures = args.output;
-  result.pictures.replace_filename(args.output.stem().string() + "-response");
-  if (Status status = task.CheckCancelled().and_then([&] { return DrawResponse(result); });
-      !status) {
-    return tl::unexpected(status.error());
-  }
-  result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  return result;
+  return text + FilesText(result, (result.pictures / "linearity.svg").string());
 }
 
 }  // namespace
 
-void AdoptResponse(const ResponseFit& fit, Rig& rig) {
-  const bool are_measured = AreFluxesMeasured(rig);
-  rig.lights = Rebalanced(std::move(rig.lights), WhiteBalanceOf(rig), fit.white_balance);  // (1)
-  for (size_t k = 0; k < rig.lights.size(); ++k) {
-    Eigen::Vector3d& flux = rig.lights[k].flux_rgb;
-    if (!are_measured && fit.lights[k]) {
-      flux = flux[1] * fit.white_balance.cwiseQuotient(fit.lights[k]->white_balance);  // (2)
-    }
-  }
-  Response response{.black = fit.black_dn, .white = fit.white_dn};
-  response.white_balance = fit.white_balance;
-  if (fit.transfer) {
-    response.gain_dn_per_electron = fit.transfer->gain_dn_per_electron;
-    response.read_noise_dn = fit.transfer->read_noise_dn;
-  }
-  rig.response = response;
-}
-
 void AddCalibrateResponse(CLI::App& calibrate, CalibrateResponseArgs& args) {
   CLI::App* cmd = calibrate.add_subcommand(
       "response", "Linearity, saturation, noise and white balance from a neutral grey chart");
-  cmd->add_option("chart", args.chart,
+  CalibrateResponseOptions& options = args.options;
+  cmd->add_option("chart", options.chart,
                   "Session of kind chart: RAW frames of several exposures, in pairs, and dark ones")
       ->required();
-  cmd->add_option("--patches", args.patches,
+  cmd->add_option("--patches", options.patches,
                   "The chart's patches: places and reflectances, as samples/charts/neutral.json")
       ->required();
-  cmd->add_option("-o,--output", args.output, "Rig file to write; a former one is kept as a copy")
+  cmd->add_option("-o,--output", options.output,
+                  "Rig file to write; one that exists is kept as a copy")
       ->required();
-  cmd->add_option("--rig", args.rig,
-                  "Rig to start from: camera with its pose, lights; default: what is at -o, or "
+  cmd->add_option("--rig", options.rig,
+                  "Rig with the camera, its pose and the lights; default: the one at --output, or "
                   "else the session's own");
-  cmd->add_option("--tolerance", args.fit.linearity.tolerance,
-                  "Of proportionality, for the linear range; above 0 and up to 0.2")
+  cmd->add_option("--tolerance", options.fit.linearity.tolerance,
+                  "Largest deviation from proportionality within the linear range (0, 0.2]")
       ->capture_default_str();
-  cmd->add_option("--max-shift", args.find.max_shift_mm,
-                  "How far from the table's middle the chart is looked for [mm]")
+  cmd->add_option("--max-shift", options.find.max_shift_mm,
+                  "Largest distance of the chart from the table's middle [mm]")
       ->capture_default_str();
-  cmd->add_option("--threads", args.threads, "Threads to use; 0: one for each core")
-      ->check(CLI::Range(0, 1024))
-      ->capture_default_str();
-  cmd->add_flag("--json", args.json, "Print one JSON object on stdout instead of the table");
+  AddThreadsAndJson(*cmd, args.threads, args.json);
 }
 
 int RunCalibrateResponse(const CalibrateResponseArgs& args, const Task& task, std::ostream& out,
                          std::ostream& log) {
-  Result<ResponseCalibration> result = Calibrate(args, task.WithThreads(args.threads));
+  const Result<ResponseCalibration> result =
+      CalibrateResponseFromChart(args.options, task.WithThreads(args.threads));
   task.ClearProgress();
-  return FinishCalibration("response", args, std::move(result), out, log);
+  return FinishCalibration("response", args.json, result, TextReport, out, log);
 }
 
 }  // namespace sateen::cli

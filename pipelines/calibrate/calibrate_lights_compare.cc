@@ -13,7 +13,7 @@ namespace {
 
 constexpr int kHandfulOfRounds = 5;  // "We can repeat this process a handful of times"
 
-// What light k does at sample i of a sheet.
+// Light k at sample i of a sheet.
 using WayIncident = std::function<Incident(const Sheet& sheet, size_t light, size_t sample)>;
 
 class Comparison {
@@ -36,7 +36,7 @@ class Comparison {
   [[nodiscard]] WayFigures RulerWithFallOff() const {
     Lights lights = rough_;
     for (size_t k = 0; k < lights.size(); ++k) {
-      // What IncidentAt gives at the origin for this flux is the intensity measured there.
+      // IncidentAt() at the origin gives, for this flux, the intensity measured there.
       lights[k].flux_rgb.setOnes();
       const Eigen::Vector3d unit = IncidentAt(lights[k], Eigen::Vector3d::Zero()).e_rgb;
       lights[k].flux_rgb = IntensityAtCentre(sheets_[0].samples[k], lights[k].position_mm, albedo_)
@@ -119,7 +119,7 @@ double DirectionErrorDeg(const Light& a, const Light& b, const std::vector<Sheet
   for (const SheetSample& sample : samples) {
     const Eigen::Vector3d la = IncidentAt(a, sample.point_mm).l;
     const Eigen::Vector3d lb = IncidentAt(b, sample.point_mm).l;
-    worst = std::max(worst, std::atan2(la.cross(lb).norm(), la.dot(lb)));
+    worst = std::max(worst, AngleBetweenRad(la, lb));
   }
   return worst / kRadPerDeg;
 }

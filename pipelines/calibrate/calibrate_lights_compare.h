@@ -10,7 +10,7 @@
 
 namespace sateen {
 
-// How far the sheets come out from how they lie with lights from one way of calibrating; worst tile.
+// Errors of the sheets' normals with lights from one way of calibrating, in the worst tile.
 struct WayFigures {
   std::string key;                            // in the report
   std::string label;                          // before people
@@ -19,13 +19,13 @@ struct WayFigures {
   std::optional<double> direction_error_deg;  // against truth, worst light and place
 };
 
-// Worst angle between two lights' directions among the samples.
+// Returns the worst angle between two lights' directions among the samples.
 [[nodiscard]] double DirectionErrorDeg(const Light& a, const Light& b,
                                        const std::vector<SheetSample>& samples);
 
-/// The sheets solved with lights from: the ruler, with one intensity a light; the ruler, with fall-off
-/// over distance; the procedure of calibration/lights/seed_procedure.h from the first sheet, in both readings;
-/// the fit, last.
+/// Solves the sheets with lights from: the ruler, with one intensity per light; the ruler, with
+/// fall-off over distance; the procedure of calibration/lights/seed_procedure.h from the first
+/// sheet, in both readings; the fit, last.
 ///
 /// fitted  the lights of the fit
 /// truth   in any order, or empty

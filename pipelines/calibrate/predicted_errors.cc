@@ -66,7 +66,7 @@ Squares Compare(const LightFit& fit, const Light& truth, const std::vector<Sheet
   for (const SheetSample& sample : samples) {
     const Eigen::Vector3d a = fit.light.position_mm - sample.point_mm;
     const Eigen::Vector3d b = truth.position_mm - sample.point_mm;
-    worst = std::max(worst, std::atan2(a.cross(b).norm(), a.dot(b)));
+    worst = std::max(worst, AngleBetweenRad(a, b));
   }
   squares.direction = std::pow(worst / fit.direction_sd_rad, 2);
   return squares;

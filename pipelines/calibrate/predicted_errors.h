@@ -19,20 +19,20 @@ struct PredictedErrorOptions {
   [[nodiscard]] Status Validate() const;
 };
 
-// Root mean square, over the rigs, of an actual error over the standard deviation that the fit gave it:
-// 1 where those are right.
+// Root mean square, over the rigs, of actual errors over the standard deviations that the fit gave
+// them: 1 where those are right.
 struct ErrorRatios {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();  // along x, y, z
   Eigen::Vector3d flux = Eigen::Vector3d::Zero();      // red, green, blue
-  // Of the worst direction error over the field; its standard deviation is that along the worst of
-  // two axes at the worst place, so that up to sqrt 2 is right.
+  // Worst direction error over the field. The fit's standard deviation is along the worst of two
+  // axes at the worst place, so that up to sqrt 2 is right.
   double direction = 0.0;
   int rigs = 0;
 };
 
-/// Are the standard deviations of FitLight() those of its errors? Rigs at random: the camera's
-/// size (0.3 to 16 megapixels), height, field and full well; the light's place on the hemisphere (25 to 60
-/// degrees from the zenith, 450 to 750 mm), flux and colour; the tilts' slopes (5 to 15 degrees)
+/// Compares the errors of FitLight() with their standard deviations on random rigs: the camera's
+/// size (0.3 to 16 megapixels), height, field and full well; the light's place on the hemisphere (25 to
+/// 60 degrees from the zenith, 450 to 750 mm), flux and colour; the tilts' slopes (5 to 15 degrees)
 /// and directions.
 ///
 /// Errors  kInvalidArgument: an option out of range; those of FitLight(); kCancelled

@@ -1,44 +1,67 @@
 #include "pipelines/calibrate/rig_calibration.h"
 
+#include <ctime>
+
+#include "core/version.h"
 #include "pipelines/calibrate/rig_record.h"
 
 namespace sateen {
 namespace {
 
-// What the rig at `output` was calibrated for and the one that takes its place is not.
-std::string LostFrom(const std::filesystem::path& output, const Rig& rig) {
-  std::error_code ignored;
-  const Result<Rig> former =
-      std::filesystem::exists(output, ignored) ? ReadRig(output) : Result<Rig>(Rig());
+// Names the calibrations that `former` had and `rig` lacks; "" where there are none.
+std::string LostFrom(const Rig& former, const Rig& rig) {
   std::string lost;
-  for (const char* kind : {"lens", "pose", "response", "lights"}) {
-    if (former && !RecordedFigure(*former, kind, "date").is_null() &&
-        RecordedFigure(rig, kind, "date").is_null()) {
+  const auto compare = [&](const char* kind, const auto& before, const auto& after) {
+    if (before && before->date && !(after && after->date)) {
       lost += (lost.empty() ? "" : ", ") + std::string(kind);
     }
-  }
+  };
+  compare("lens", former.calibration.lens, rig.calibration.lens);
+  compare("pose", former.calibration.pose, rig.calibration.pose);
+  compare("response", former.calibration.response, rig.calibration.response);
+  compare("lights", former.calibration.lights, rig.calibration.lights);
   return lost;
 }
 
 }  // namespace
 
-Status WriteCalibratedRig(const std::filesystem::path& output, std::string_view kind,
-                          const nlohmann::json& figures, RigCalibration& calibration) {
-  RecordCalibration(calibration.rig, kind, figures, calibration.sha256_of_input);
-  const std::string lost = LostFrom(output, calibration.rig);
+void BeginCalibration(const std::filesystem::path& output, std::string_view kind,
+                      RigCalibration& calibration) {
+  calibration.output = output;
+  calibration.pictures = output;
+  calibration.pictures.replace_filename(fmt::format("{}-{}", output.stem().string(), kind));
+}
+
+void FillCommon(std::string_view kind, const RigCalibration& calibration,
+                CalibrationRecord& record) {
+  record.schema = fmt::format("sateen.calibrate.{}/1", kind);
+  record.version = Version();
+  record.seconds = calibration.seconds;
+  record.warnings = calibration.warnings;
+  record.inputs = calibration.sha256_of_input;
+}
+
+Status WriteCalibratedRig(RigCalibration& calibration) {
+  const std::filesystem::path& output = calibration.output;
+  std::error_code ignored;
+  const Result<Rig> before =
+      std::filesystem::exists(output, ignored) ? ReadRig(output) : Result<Rig>(Rig());
+  const std::string lost = before ? LostFrom(*before, calibration.rig) : "";
   Result<std::filesystem::path> former = ReplaceRig(output, calibration.rig);
   if (!former) {
     return tl::unexpected(former.error());
   }
-  calibration.former_rig = *std::move(former);
+  calibration.former_output = *std::move(former);
   if (!lost.empty()) {
     calibration.warnings.push_back(fmt::format(
-        "the calibration of {} that {} had is not in the rig that was given with --rig and is left "
-        "out; it is kept in {}. To add to {} leave --rig out, or begin from a copy of it",
-        lost, output.string(), calibration.former_rig.string(), output.string()));
+        "the calibration of {0} in {1} is not in the rig that was given with --rig and is lost "
+        "there; {2} keeps it. To add to {1}, leave --rig out, or start from a copy of {1}",
+        lost, output.string(), calibration.former_output.string()));
   }
   return {};
 }
+
+std::string DateOfNow() { return TimeText("%Y-%m-%dT%H:%M:%SZ"); }
 
 Result<std::optional<Rig>> ReadTrueRig(const std::filesystem::path& session) {
   const std::filesystem::path path = session / "truth" / "rig.json";

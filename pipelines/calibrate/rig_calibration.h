@@ -2,12 +2,9 @@
 
 #include <filesystem>
 #include <map>
-#include <nlohmann/json.hpp>
 #include <optional>
-#include <ostream>
 #include <string>
 #include <string_view>
-#include <utility>
 #include <vector>
 
 #include "core/error.h"
@@ -15,42 +12,43 @@
 
 namespace sateen {
 
-// What every calibration that goes into a rig has beside its own figures.
+// Members that the outcomes of all calibrators share.
 struct RigCalibration {
   Rig rig;  // as it is written
   std::vector<std::string> warnings;
   std::map<std::string, std::string> sha256_of_input;
-  std::filesystem::path pictures;
-  std::filesystem::path former_rig;  // empty: there was none
+  std::filesystem::path output;         // the file that was written
+  std::filesystem::path former_output;  // copy of the file that was there; empty: there was none
+  std::filesystem::path pictures;       // folder
   double seconds = 0.0;
 };
 
-// Records the figures of one kind of calibration in the rig and writes it to `output`; one that is
-// there is kept as `former_rig`.
-[[nodiscard]] Status WriteCalibratedRig(const std::filesystem::path& output, std::string_view kind,
-                                        const nlohmann::json& figures, RigCalibration& calibration);
+// Sets `output`, and `pictures` to a folder beside it: "rig-lens" for rig.json and kind "lens".
+void BeginCalibration(const std::filesystem::path& output, std::string_view kind,
+                      RigCalibration& calibration);
 
-// The rig that a simulated session was rendered with, to compare with; nothing of a photographed one.
-[[nodiscard]] Result<std::optional<Rig>> ReadTrueRig(const std::filesystem::path& session);
+// Sets the members of CalibrationRecord, except for the date.
+void FillCommon(std::string_view kind, const RigCalibration& calibration,
+                CalibrationRecord& record);
 
-// Ends `sateen calibrate <kind>`: writes the rig, then warnings or the error to `log` and the report to
-// `out`. Calibration: a RigCalibration with JsonReport() and TextReport(). Returns the exit status.
-template <typename Args, typename Calibration>
-int FinishCalibration(std::string_view kind, const Args& args, Result<Calibration> result,
-                      std::ostream& out, std::ostream& log) {
-  const Status status =
-      result ? WriteCalibratedRig(args.output, kind,
-                                  nlohmann::json::parse(JsonReport(args, *result)), *result)
-             : tl::unexpected(result.error());
-  if (!status) {
-    log << "sateen calibrate " << kind << ": error: " << status.error().message << '\n';
-    return ExitStatus(status.error());
-  }
-  for (const std::string& warning : result->warnings) {
-    log << "sateen calibrate " << kind << ": warning: " << warning << '\n';
-  }
-  out << (args.json ? JsonReport(args, *result) + "\n" : TextReport(args, *result));
-  return 0;
+// Writes calibration.rig to calibration.output. Keeps a rig that is there as a copy, former_output;
+// warns of calibrations that it had and the new one lacks.
+[[nodiscard]] Status WriteCalibratedRig(RigCalibration& calibration);
+
+// Returns the time now, in UTC: "2026-05-04T03:02:01Z".
+[[nodiscard]] std::string DateOfNow();
+
+// Ends a calibration: puts the record into the rig, dated, and writes the rig.
+template <typename Record>
+[[nodiscard]] Status RecordAndWrite(const Record& record,
+                                    std::optional<Record> CalibrationRecords::*member,
+                                    RigCalibration& calibration) {
+  Record& recorded = (calibration.rig.calibration.*member).emplace(record);
+  recorded.date = DateOfNow();
+  return WriteCalibratedRig(calibration);
 }
+
+// Reads the rig that a simulated session was rendered with; nothing for a session of photographs.
+[[nodiscard]] Result<std::optional<Rig>> ReadTrueRig(const std::filesystem::path& session);
 
 }  // namespace sateen

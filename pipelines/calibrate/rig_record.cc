@@ -4,41 +4,15 @@
 
 #include "core/file_io.h"
 #include "core/output_folder.h"
-#include "core/version.h"
 
 namespace sateen {
-namespace {
-
-std::string TimeAs(const char* format) {
+std::string TimeText(const char* format) {
   const std::time_t now = std::time(nullptr);
   std::tm utc{};
   gmtime_r(&now, &utc);
   std::string text(32, '\0');
   text.resize(std::strftime(text.data(), text.size(), format, &utc));
   return text;
-}
-
-}  // namespace
-
-void RecordCalibration(Rig& rig, std::string_view kind, nlohmann::json figures,
-                       const std::map<std::string, std::string>& sha256_of_input) {
-  nlohmann::json all = nlohmann::json::object();
-  if (!rig.calibration_json.empty()) {
-    all = nlohmann::json::parse(rig.calibration_json, nullptr, /*allow_exceptions=*/false);
-  }
-  for (const char* key : {"output", "former_rig", "pictures"}) {
-    figures.erase(key);  // names of one machine, and of one moment
-  }
-  if (const auto linearity = figures.find("linearity"); linearity != figures.end()) {
-    for (nlohmann::json& channel : *linearity) {
-      channel.erase("bins");  // a picture's worth
-    }
-  }
-  figures["date"] = TimeAs("%Y-%m-%dT%H:%M:%SZ");
-  figures["version"] = Version();
-  figures["inputs"] = sha256_of_input;
-  all[std::string(kind)] = std::move(figures);
-  rig.calibration_json = all.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 
 Result<Rig> RigToBeginWith(const std::filesystem::path& rig_file,
@@ -61,16 +35,6 @@ std::optional<std::filesystem::path> RigFileToBeginWith(const std::filesystem::p
   return path;
 }
 
-nlohmann::json RecordedFigure(const Rig& rig, const std::string& kind, const std::string& figure) {
-  const nlohmann::json all =
-      nlohmann::json::parse(rig.calibration_json, nullptr, /*allow_exceptions=*/false);
-  const auto of_kind = all.is_object() ? all.find(kind) : all.end();
-  if (!all.is_object() || of_kind == all.end() || !of_kind->is_object()) {
-    return nullptr;
-  }
-  return of_kind->value(figure, nlohmann::json(nullptr));
-}
-
 Result<std::filesystem::path> ReplaceFile(const std::filesystem::path& path,
                                           const std::string& text) {
   std::filesystem::path former;
@@ -80,7 +44,7 @@ Result<std::filesystem::path> ReplaceFile(const std::filesystem::path& path,
     if (!kept) {
       return tl::unexpected(kept.error());
     }
-    const std::string stem = path.stem().string() + "-" + TimeAs("%Y%m%dT%H%M%SZ");
+    const std::string stem = path.stem().string() + "-" + TimeText("%Y%m%dT%H%M%SZ");
     former = path;
     former.replace_filename(stem + path.extension().string());
     for (int again = 2; std::filesystem::exists(former, error); ++again) {

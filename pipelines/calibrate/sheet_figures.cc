@@ -10,15 +10,7 @@
 namespace sateen {
 namespace {
 
-double TiltDeg(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
-  return std::atan2(a.cross(b).norm(), a.dot(b)) * kDegPerRad;
-}
-
 Eigen::Vector3d NormalOf(const SheetPose& pose) { return pose.table_from_sheet.linear().col(2); }
-
-double TiltSdDeg(const SheetPose& pose) {
-  return pose.rotation_sd_rad.head<2>().norm() * kDegPerRad;
-}
 
 }  // namespace
 
@@ -29,7 +21,8 @@ Result<SheetFigures> FiguresOfSheet(const std::filesystem::path& dir, const Shee
     return tl::unexpected(truth.error());
   }
   if (*truth) {
-    figures.tilt_error_deg = TiltDeg(NormalOf(figures.pose), (*truth)->linear().col(2));
+    figures.tilt_error_deg =
+        AngleBetweenRad(NormalOf(figures.pose), (*truth)->linear().col(2)) * kDegPerRad;
     figures.position_error_mm =
         (figures.pose.table_from_sheet.translation() - (*truth)->translation()).norm();
   }
@@ -61,46 +54,12 @@ std::optional<std::string> FaultOfSheet(const std::filesystem::path& dir, const 
       dir.string(), 100.0 * fault->share, lights[fault->worst_light].name, what);
 }
 
-std::string SheetsTable(const std::vector<SheetFigures>& sheets) {
-  if (sheets.empty()) {
-    return "";
-  }
-  std::string text =
-      fmt::format("{:<28} {:>8} {:>19} {:>23} {:>15} {:>7}\n", "sheet, by its border", "markers",
-                  "tilt +- deg", "x, y, z +- mm", "off the truth", "misfit");
-  for (const SheetFigures& figures : sheets) {
-    const SheetPose& pose = figures.pose;
-    const Eigen::Vector3d at = pose.table_from_sheet.translation();
-    const std::string off = figures.tilt_error_deg
-                                ? fmt::format("{:.4f} deg", *figures.tilt_error_deg)
-                                : std::string("-");
-    text += fmt::format(
-        "{:<28} {:>8} {:>9.4f} +- {:.4f} {:>6.1f} {:>5.1f} {:>5.1f} +- {:.3f} {:>14} {:>5.1f} %\n",
-        std::filesystem::path(figures.name).filename().string(),
-        fmt::format("{} of {}", pose.markers_used, pose.markers),
-        TiltDeg(NormalOf(pose), Eigen::Vector3d::UnitZ()), TiltSdDeg(pose), at.x(), at.y(), at.z(),
-        pose.position_sd_mm.norm(), off, 100.0 * pose.misfit);
-  }
-  return text + "\n";
+double TiltDeg(const SheetPose& pose) {
+  return AngleBetweenRad(NormalOf(pose), Eigen::Vector3d::UnitZ()) * kDegPerRad;
 }
 
-nlohmann::json SheetsJson(const std::vector<SheetFigures>& sheets) {
-  nlohmann::json json = nlohmann::json::array();
-  for (const SheetFigures& figures : sheets) {
-    const SheetPose& pose = figures.pose;
-    const Eigen::Vector3d& sd_mm = pose.position_sd_mm;
-    nlohmann::json one = {
-        {"name", figures.name},           {"table_from_sheet", RowMajor(pose.table_from_sheet)},
-        {"tilt_sd_deg", TiltSdDeg(pose)}, {"position_sd_mm", {sd_mm.x(), sd_mm.y(), sd_mm.z()}},
-        {"markers", pose.markers_used},   {"markers_of_border", pose.markers},
-        {"misfit", pose.misfit},          {"blur_px", pose.blur_px}};
-    if (figures.tilt_error_deg) {
-      one["tilt_error_deg"] = *figures.tilt_error_deg;
-      one["position_error_mm"] = *figures.position_error_mm;
-    }
-    json.push_back(std::move(one));
-  }
-  return json;
+double TiltSdDeg(const SheetPose& pose) {
+  return pose.rotation_sd_rad.head<2>().norm() * kDegPerRad;
 }
 
 }  // namespace sateen

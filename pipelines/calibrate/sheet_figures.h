@@ -1,7 +1,6 @@
 #pragma once
 
 #include <filesystem>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <vector>
@@ -12,7 +11,7 @@
 
 namespace sateen {
 
-// Where a sheet lies, as its border tells.
+// A sheet's pose, found by its border.
 struct SheetFigures {
   std::string name;  // its session's folder
   SheetPose pose;
@@ -21,18 +20,18 @@ struct SheetFigures {
   std::optional<double> position_error_mm;
 };
 
-// Of a sheet whose pose was found by its border. kIo, kBadData as ReadTruePose().
+// Returns the figures of a sheet whose pose was found by its border. Fails as ReadTruePose().
 [[nodiscard]] Result<SheetFigures> FiguresOfSheet(const std::filesystem::path& dir,
                                                   const Sheet& sheet);
 
-// Words on what of the sheet does not follow the fitted lights: a fold, the paper's edge. Nothing
-// where it all does.
+// Describes the part of the sheet that does not follow the fitted lights: a fold, the paper's edge.
+// Returns nothing where there is none.
 [[nodiscard]] std::optional<std::string> FaultOfSheet(const std::filesystem::path& dir,
                                                       const Sheet& sheet, const Lights& lights,
                                                       double albedo);
 
-// A line a sheet, and an empty one; empty without any.
-[[nodiscard]] std::string SheetsTable(const std::vector<SheetFigures>& sheets);
-[[nodiscard]] nlohmann::json SheetsJson(const std::vector<SheetFigures>& sheets);
+// Return the angle between the normals of sheet and table, and its standard deviation.
+[[nodiscard]] double TiltDeg(const SheetPose& pose);
+[[nodiscard]] double TiltSdDeg(const SheetPose& pose);
 
 }  // namespace sateen

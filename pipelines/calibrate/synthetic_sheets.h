@@ -16,7 +16,7 @@
 // In a header alone, because tests of modules below cli/ use it too.
 namespace sateen {
 
-// What a 14-bit camera reads of white paper, without pictures: block means with their noise.
+// Readings of a 14-bit camera from white paper, without pictures: block means with their noise.
 struct SyntheticCamera {
   Camera camera;
   int columns = 64;  // blocks
@@ -31,7 +31,8 @@ struct SyntheticCamera {
   }
 };
 
-// Of a flat sheet and `count` - 1 that rise by ten degrees towards x, y, -x, -y and round again.
+// Returns the normals of a flat sheet and `count` - 1 that rise by ten degrees towards x, y, -x, -y
+// and round again.
 inline std::vector<Eigen::Vector3d> SheetNormals(int count) {
   std::vector<Eigen::Vector3d> normals = {Eigen::Vector3d::UnitZ()};
   for (int tilt = 1; tilt < count; ++tilt) {

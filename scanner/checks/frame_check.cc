@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <nlohmann/json.hpp>
 #include <numeric>
 
 #include "scanner/checks/frame_compare.h"
@@ -36,12 +35,6 @@ double Median(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());
   return *middle;
-}
-
-bool LightsAreCalibrated(const Rig& rig) {
-  return !rig.calibration_json.empty() &&
-         nlohmann::json::parse(rig.calibration_json, nullptr, /*allow_exceptions=*/false)
-             .contains("lights");
 }
 
 class CaptureChecker {
@@ -211,7 +204,7 @@ class CaptureChecker {
 
   void CheckLevels() {
     const double change =
-        LightsAreCalibrated(rig_) ? options_.max_level_change : options_.max_rough_level_change;
+        rig_.calibration.lights ? options_.max_level_change : options_.max_rough_level_change;
     for (size_t k = 0; k < signal_.size(); ++k) {
       const double level = check_.levels[k];
       if (on_[k] && !is_explained_[k] && std::abs(level - 1.0) > change) {

@@ -192,8 +192,8 @@ TEST_F(CalibrateLensCommand, PoseOfABoardLyingAside) {
   const RunResult shrunk = CalibratePose({Path("aside"), "--board", "charuco:10x7:27.8mm:20mm",
                                           "--rig", Path("true.json"), "-o", Path("shrunk.json")});
   ASSERT_EQ(shrunk.exit_status, 0) << shrunk.log;
-  EXPECT_THAT(shrunk.log, HasSubstr("mm above the table, 430 mm by the former pose: where it was "
-                                    "not moved, the board is not of the size that "
+  EXPECT_THAT(shrunk.log, HasSubstr("mm above the table, 430 mm by the previous pose: unless it "
+                                    "was moved, the board is not of the size that "
                                     "charuco:10x7:27.8mm:20mm"));
 }
 
@@ -202,29 +202,30 @@ TEST_F(CalibrateLensCommand, KeepsTheRestOfTheRigAndSaysWhatIsOutOfDate) {
   rig.lights[0].model = LightModel::kNear;
   rig.lights[0].position_mm = {10, 20, 500};
   rig.response = Response{.black = 5, .white = 100};
-  rig.calibration_json = R"({"lights": {"date": "then"}})";
+  rig.calibration.lights.emplace().date = "then";
   WriteText(Path("whole.json"), RigToJson(rig));
   const std::string before = Text(Path("whole.json"));
   const RunResult lens =
       CalibrateLens({Path("boards"), "--board", kBoard, "-o", Path("whole.json")});
   ASSERT_EQ(lens.exit_status, 0) << lens.log;
-  EXPECT_THAT(lens.log, HasSubstr("found with the former lens; run sateen calibrate pose again, "
+  EXPECT_THAT(lens.log, HasSubstr("found with the previous lens; run sateen calibrate pose again, "
                                   "then sateen calibrate lights"));
   const Rig after = ReadRig(Path("whole.json")).value();
   EXPECT_EQ(after.lights[0].position_mm, rig.lights[0].position_mm);
   EXPECT_EQ(after.response->white, 100);
-  EXPECT_THAT(lens.log, Not(HasSubstr("is left out")));
+  EXPECT_THAT(lens.log, Not(HasSubstr("is lost there")));
   // A rig given with --rig that was never calibrated takes the place of one that was.
   fs::copy(Path("whole.json"), Path("replaced.json"));
   const RunResult replaced = CalibrateLens(
       {Path("boards"), "--board", kBoard, "--rig", Path("true.json"), "-o", Path("replaced.json")});
   ASSERT_EQ(replaced.exit_status, 0) << replaced.log;
-  EXPECT_THAT(replaced.log, HasSubstr("the calibration of lights that"));
+  EXPECT_THAT(replaced.log,
+              HasSubstr("the calibration of lights in " + Path("replaced.json") + " is not"));
   EXPECT_EQ(after.camera->table_from_camera.matrix(), rig.camera->table_from_camera.matrix());
   EXPECT_NE(after.camera->fx, rig.camera->fx);
-  const nlohmann::json record = nlohmann::json::parse(after.calibration_json);
-  EXPECT_EQ(record["lights"]["date"], "then");
-  EXPECT_EQ(record["lens"]["inputs"].size(), 16U);  // of each view its record and its frame
+  EXPECT_EQ(after.calibration.lights.value().date, "then");
+  EXPECT_EQ(after.calibration.lens.value().inputs.value().size(),
+            16U);  // of each view its record and its frame
   bool kept = false;
   for (const auto& entry : fs::directory_iterator(folder_->Path())) {
     kept = kept || (entry.path().filename().string().starts_with("whole-2") &&
@@ -247,7 +248,7 @@ TEST_F(CalibrateLensCommand, NamesWhatItCannotUse) {
   const RunResult run =
       CalibrateLens({mixed.string(), "--board", kBoard, "-o", Path("mixed.json"), "--json"});
   ASSERT_EQ(run.exit_status, 0) << run.log;
-  EXPECT_THAT(run.log, HasSubstr("left alone: notes.txt: no photograph"));
+  EXPECT_THAT(run.log, HasSubstr("ignored: notes.txt: no photograph"));
   EXPECT_THAT(run.log, HasSubstr("blank.png is not used: 0 markers of DICT_4X4_50 found"));
   EXPECT_THAT(run.log, HasSubstr("small.png is not used: is 320 x 240 px, and most are 640 x 480"));
   EXPECT_THAT(run.log, HasSubstr("broken.jpg is not used: "));

@@ -129,7 +129,8 @@ TEST_F(CalibrateLightsCommand, FiveSheetsGivePositionsDirectionsAndFlux) {
   EXPECT_GT(Way(json, "order_1886_equation").at("tilted_sheets_deg"), 0.1);
   EXPECT_GT(Way(json, "order_1886_equation").at("direction_error_deg"), 1.0);
   const Rig rig = ReadRig(Path("five.json")).value();
-  EXPECT_THAT(rig.calibration_json, HasSubstr("flat/frames/led-3.dng"));  // among the inputs
+  EXPECT_TRUE(
+      rig.calibration.lights.value().inputs.value().contains(Path("flat/frames/led-3.dng")));
   EXPECT_TRUE(fs::exists(Path("five-lights/residuals.png")));
   EXPECT_TRUE(fs::exists(Path("five-lights/before.png")));
 }
@@ -216,15 +217,15 @@ TEST_F(CalibrateLightsCommand, AFrameThatIsThereTwiceIsFound) {
 TEST_F(CalibrateLightsCommand, TheRigAtTheOutputIsWhatItAddsTo) {
   fs::copy_file(Path("rough.json"), Path("grown.json"));
   Rig grown = ReadRig(Path("grown.json")).value();
-  grown.calibration_json = R"({"lens": {"board": "mine"}})";
+  grown.calibration.lens.emplace().board = "mine";
   WriteText(Path("grown.json"), RigToJson(grown));
 
   const RunResult run = CalibrateLights({"--sheet", Path("flat"), "-o", Path("grown.json")});
 
   ASSERT_EQ(run.exit_status, 0) << run.log;
   const Rig after = ReadRig(Path("grown.json")).value();
-  EXPECT_THAT(after.calibration_json, HasSubstr("mine"));
-  EXPECT_THAT(after.calibration_json, HasSubstr("lights"));
+  EXPECT_EQ(after.calibration.lens.value().board, "mine");
+  EXPECT_TRUE(after.calibration.lights);
 }
 
 TEST_F(CalibrateLightsCommand, BadSheetsAreNamedWithTheirFault) {

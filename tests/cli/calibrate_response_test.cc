@@ -12,7 +12,9 @@ namespace sateen::calibrate_response_test {
 namespace {
 
 using namespace sateen::testing;
+using ::testing::Contains;
 using ::testing::HasSubstr;
+using ::testing::Key;
 using ::testing::Not;
 
 namespace fs = std::filesystem;
@@ -88,13 +90,17 @@ TEST_F(CalibrateResponseCommand, TheRigIsWhatTheReportSays) {
   EXPECT_EQ(rig.response->white_balance[0], json.at("white_balance")[0].get<double>());
   EXPECT_EQ(*rig.response->gain_dn_per_electron,
             json.at("noise").at("gain_dn_per_electron").get<double>());
-  const nlohmann::json record = nlohmann::json::parse(rig.calibration_json).at("response");
-  EXPECT_THAT(record.at("inputs").dump(), HasSubstr("chart/frames/led-3-0.02s-1.dng"));
-  EXPECT_THAT(record.at("inputs").dump(), HasSubstr("neutral.json"));
+  const ResponseRecord record = rig.calibration.response.value();
+  EXPECT_THAT(record.inputs.value(), Contains(Key(HasSubstr("chart/frames/led-3-0.02s-1.dng"))));
+  EXPECT_THAT(record.inputs.value(), Contains(Key(HasSubstr("neutral.json"))));
+  EXPECT_EQ(record.noise.value().value().read_noise_dn,
+            json.at("noise").at("read_noise_dn").get<double>());
+  EXPECT_FALSE(record.linearity.value().red.value().bins);  // a picture's worth
+  EXPECT_FALSE(json.at("linearity").at("red").at("bins").empty());
   EXPECT_EQ(json.at("former_rig"), "");
   // Text, over the rig just written: that one is kept.
   const RunResult again = RunOn("chart", "kept.json");
-  EXPECT_THAT(again.out, HasSubstr("the former rig is kept as"));
+  EXPECT_THAT(again.out, HasSubstr("the previous file is kept as"));
   EXPECT_THAT(again.out,
               HasSubstr("expose white paper to half or two thirds of white, at most to"));
   EXPECT_THAT(again.out, HasSubstr("error against truth/rig.json: white balance"));

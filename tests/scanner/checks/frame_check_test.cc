@@ -91,7 +91,7 @@ TEST_F(CheckCaptureCase, MeasuresDriftAndAmbientLight) {
 TEST_F(CheckCaptureCase, DoesNotAskAnUncalibratedRigForLevels) {
   looks_.lit[4] = LookAt(Mixed(fabric_.lit[4], 0.8F, fabric_.dark, 0.0F), 1);
   EXPECT_THAT(Check().faults, SizeIs(1));
-  rig_.calibration_json.clear();
+  rig_.calibration = {};
   EXPECT_THAT(Check().faults, IsEmpty());
 }
 

@@ -26,13 +26,13 @@ inline constexpr size_t kLookLights = 10;
 
 inline Rig CalibratedRig() {
   Rig rig = RingRig(kLookPx, LightModel::kLed);
-  rig.calibration_json = R"({"lights": {}})";
+  rig.calibration.lights.emplace();
   return rig;
 }
 
 // By the ruler: each light is `wrong_mm` from where it is said to be.
 inline Rig RoughRig(Rig rig, double wrong_mm, uint64_t seed) {
-  rig.calibration_json.clear();
+  rig.calibration = {};
   for (size_t k = 0; k < rig.lights.size(); ++k) {
     Eigen::Vector3d direction;
     for (uint64_t axis = 0; axis < 3; ++axis) {

@@ -27,7 +27,7 @@ inline constexpr double kCaptureScale = 1.5;  // radiance that saturates
 
 inline Rig CaptureRig() {
   Rig rig = RingRig(kCapturePx, LightModel::kLed);
-  rig.calibration_json = R"({"lights": {}})";
+  rig.calibration.lights.emplace();
   return rig;
 }
 

@@ -1,14 +1,13 @@
-#include <cmath>
-#include <nlohmann/json.hpp>
+#include "pipelines/calibrate/pose_pictures.h"
 
-#include "cli/calibrate/calibrate_pose.h"
-#include "core/angle.h"
+#include <cmath>
+
 #include "core/output_folder.h"
-#include "core/version.h"
 #include "imaging/image_io.h"
 #include "imaging/show/canvas.h"
+#include "scanner/sessions/board_photos.h"
 
-namespace sateen::cli {
+namespace sateen {
 namespace {
 
 constexpr int kAxesWidthPx = 1000;
@@ -18,24 +17,13 @@ constexpr double kReachMm = 1000.0;  // of the grid
 constexpr double kAxisMm = 50.0;
 constexpr Color8 kGridInk = {90, 190, 255};
 
-// Between the camera's axis and straight down.
-double LeanDeg(const Camera& camera) {
-  const Eigen::Vector3d axis = camera.table_from_camera.linear().col(2);
-  return std::atan2(axis.head<2>().norm(), -axis.z()) * kDegPerRad;
-}
-
-std::string DegreesOf(const Eigen::Vector3d& rad) {
-  return fmt::format("{:.4f}, {:.4f}, {:.4f}", rad[0] * kDegPerRad, rad[1] * kDegPerRad,
-                     rad[2] * kDegPerRad);
-}
-
 // Lines on the table, bent as the lens bends them.
 class TablePen {
  public:
   TablePen(const Camera& camera, double scale, Canvas& canvas)
       : camera_(camera), scale_(scale), canvas_(canvas) {}
 
-  // Where the canvas shows a table point; nothing outside the image.
+  // Returns the canvas's point of a table point; nothing outside the image.
   [[nodiscard]] std::optional<Eigen::Vector2d> At(const Eigen::Vector3d& x_mm) const {
     const Eigen::Vector3d in_camera = camera_.table_from_camera.inverse() * x_mm;
     if (!(in_camera.z() > 1.0)) {
@@ -117,65 +105,4 @@ Status DrawPose(const PoseCalibration& result, double thickness_mm) {
   });
 }
 
-std::string JsonReport(const CalibratePoseArgs& args, const PoseCalibration& result) {
-  const Camera& camera = *result.rig.camera;
-  const Eigen::Matrix<double, 4, 4, Eigen::RowMajor> pose = camera.table_from_camera.matrix();
-  const PoseFit& fit = result.fit;
-  nlohmann::json report = {
-      {"schema", "sateen.calibrate.pose/1"},
-      {"version", Version()},
-      {"output", args.output.string()},
-      {"former_rig", result.former_rig.string()},
-      {"pictures", result.pictures.string()},
-      {"board", result.board.Text()},
-      {"thickness_mm", args.thickness_mm},
-      {"photographs", result.found.views.size()},
-      {"corners", result.corners},
-      {"table_from_camera", std::vector<double>(pose.data(), pose.data() + pose.size())},
-      {"lean_deg", LeanDeg(camera)},
-      {"rms_px", fit.reprojection_rms_px},
-      {"position_sd_mm", {fit.position_sd_mm[0], fit.position_sd_mm[1], fit.position_sd_mm[2]}},
-      {"rotation_sd_deg",
-       {fit.rotation_sd_rad[0] * kDegPerRad, fit.rotation_sd_rad[1] * kDegPerRad,
-        fit.rotation_sd_rad[2] * kDegPerRad}},
-      {"edge_sd_mm", result.edge_sd_mm},
-      {"moved_mm", result.moved_mm},
-      {"turned_deg", result.turned_deg},
-      {"seconds", result.seconds},
-      {"warnings", result.warnings},
-      {"inputs", result.sha256_of_input}};
-  if (result.position_error_mm) {
-    report["position_error_mm"] = *result.position_error_mm;
-    report["rotation_error_deg"] = *result.rotation_error_deg;
-  }
-  return report.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
-}
-
-std::string TextReport(const CalibratePoseArgs& args, const PoseCalibration& result) {
-  const Camera& camera = *result.rig.camera;
-  const Eigen::Vector3d at_mm = camera.table_from_camera.translation();
-  const PoseFit& fit = result.fit;
-  std::string text = fmt::format(
-      "camera at        {:.2f}, {:.2f}, {:.2f} mm +- {:.3f}, {:.3f}, {:.3f}\n"
-      "it leans by      {:.3f} degrees from straight down; rotation +- {} degrees about x, y, z\n"
-      "at field's edge  a pixel's place on the table is known to +- {:.4f} mm, a light's direction "
-      "or a normal to +- {:.4f} degrees\n"
-      "corners          {} from {} photograph{}, off by {:.3f} px\n",
-      at_mm.x(), at_mm.y(), at_mm.z(), fit.position_sd_mm[0], fit.position_sd_mm[1],
-      fit.position_sd_mm[2], LeanDeg(camera), DegreesOf(fit.rotation_sd_rad), result.edge_sd_mm,
-      fit.rotation_sd_rad.head<2>().norm() * kDegPerRad, result.corners, result.found.views.size(),
-      result.found.views.size() == 1 ? "" : "s", fit.reprojection_rms_px);
-  if (result.position_error_mm) {
-    text +=
-        fmt::format("error against truth/rig.json: position {:.3g} mm, rotation {:.3g} degrees\n",
-                    *result.position_error_mm, *result.rotation_error_deg);
-  }
-  if (!result.former_rig.empty()) {
-    text += fmt::format("the former rig is kept as {}\n", result.former_rig.string());
-  }
-  text += fmt::format("{} is written after {:.1f} s; look at {}\n", args.output.string(),
-                      result.seconds, (result.pictures / "axes.png").string());
-  return text;
-}
-
-}  // namespace sateen::cli
+}  // namespace sateen

@@ -1,4 +1,4 @@
-#include "cli/calibrate/calibrate_response_pictures.h"
+#include "pipelines/calibrate/response_pictures.h"
 
 #include <algorithm>
 #include <cmath>
@@ -8,7 +8,7 @@
 #include "imaging/show/pictures.h"
 #include "imaging/show/svg_plot.h"
 
-namespace sateen::cli {
+namespace sateen {
 namespace {
 
 using Points = std::vector<std::pair<double, double>>;
@@ -187,4 +187,4 @@ Status DrawResponse(const ResponseCalibration& result) {
   return status.and_then([&] { return folder->Commit(); });
 }
 
-}  // namespace sateen::cli
+}  // namespace sateen

@@ -1,9 +1,9 @@
 #pragma once
 
-#include "cli/calibrate/calibrate_response.h"
 #include "core/error.h"
+#include "pipelines/calibrate/calibrate_response.h"
 
-namespace sateen::cli {
+namespace sateen {
 
 /// Draws into the folder result.pictures, whole or not at all:
 /// linearity.svg         readings against what exposure times say, and how far they are off it
@@ -12,4 +12,4 @@ namespace sateen::cli {
 ///                       patch, red where that is left out under some light
 [[nodiscard]] Status DrawResponse(const ResponseCalibration& result);
 
-}  // namespace sateen::cli
+}  // namespace sateen

@@ -1,4 +1,4 @@
-#include "cli/calibrate/calibrate_lens_pictures.h"
+#include "pipelines/calibrate/lens_pictures.h"
 
 #include <algorithm>
 #include <cmath>
@@ -10,7 +10,7 @@
 #include "imaging/show/canvas.h"
 #include "scanner/sessions/board_photos.h"
 
-namespace sateen::cli {
+namespace sateen {
 namespace {
 
 constexpr int kWidthPx = 960;  // of a picture
@@ -275,4 +275,4 @@ Status DrawLens(LensCalibration& result) {
       .and_then([&] { return folder->Commit(); });
 }
 
-}  // namespace sateen::cli
+}  // namespace sateen

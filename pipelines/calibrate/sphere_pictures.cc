@@ -1,4 +1,4 @@
-#include "cli/calibrate/sphere_pictures.h"
+#include "pipelines/calibrate/sphere_pictures.h"
 
 #include <algorithm>
 #include <cmath>
@@ -10,7 +10,7 @@
 #include "imaging/image_io.h"
 #include "imaging/show/pictures.h"
 
-namespace sateen::cli {
+namespace sateen {
 namespace {
 
 constexpr int kSpherePanelPx = 900;
@@ -36,7 +36,7 @@ void Dot(cv::Mat3b& picture, const Eigen::Vector2d& at, double radius, const cv:
              cv::LINE_AA, kFraction);
 }
 
-// With a halo. `anchor` is the share of the text's width and height that lies left of and above `at`.
+// Draws text with a halo. `anchor`: share of its width and height that lies left of and above `at`.
 void Text(cv::Mat3b& picture, const std::string& text, const Eigen::Vector2d& at, double scale,
           const cv::Scalar& color, const Eigen::Vector2d& anchor = {0.0, 0.5}) {
   int below = 0;
@@ -72,7 +72,7 @@ Rgb8 AsRgb8(const cv::Mat3b& mat) {
   return picture;
 }
 
-// One sphere, enlarged, with its outline and the highlights in it.
+// Draws one sphere, enlarged, with its outline and the highlights in it.
 Rgb8 SpherePanel(const SpheresCalibration& result, const cv::Mat3b& shown, size_t index) {
   const Sphere& sphere = result.spheres[index];
   const double half = kPanelRadii * sphere.outline.radius_px;
@@ -107,7 +107,7 @@ Rgb8 SpherePanel(const SpheresCalibration& result, const cv::Mat3b& shown, size_
   return AsRgb8(panel);
 }
 
-// The zenith in the middle, x to the right, y up, the horizon as the outermost circle.
+// Draws the sky: the zenith in the middle, x to the right, y up, the horizon outermost.
 Rgb8 PolarPlot(const SpheresCalibration& result) {
   cv::Mat3b plot(kSpherePanelPx, kSpherePanelPx, cv::Vec3b(255, 255, 255));
   const Eigen::Vector2d middle(kSpherePanelPx / 2.0, kSpherePanelPx / 2.0);
@@ -159,4 +159,4 @@ Status DrawSpheres(const SpheresCalibration& result) {
   return status ? status : tl::unexpected(folder->InPlace(status.error()));
 }
 
-}  // namespace sateen::cli
+}  // namespace sateen
