@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "cli/device_options.h"
-#include "cli/quantity.h"
+#include "core/quantity.h"
 
 namespace sateen::cli {
 namespace {

@@ -3,7 +3,7 @@
 #include <set>
 
 #include "cli/capture.h"
-#include "cli/quantity.h"
+#include "core/quantity.h"
 
 namespace sateen::cli {
 namespace {

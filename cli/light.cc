@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "cli/light_report.h"
-#include "cli/quantity.h"
+#include "core/quantity.h"
 #include "rig/rig.h"
 #include "scanner/daemon/board_job.h"
 #include "scanner/daemon/light_job.h"

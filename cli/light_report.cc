@@ -4,7 +4,7 @@
 #include <nlohmann/json.hpp>
 #include <vector>
 
-#include "cli/quantity.h"
+#include "core/quantity.h"
 
 namespace sateen::cli {
 namespace {

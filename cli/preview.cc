@@ -4,7 +4,7 @@
 #include <ostream>
 
 #include "cli/device_options.h"
-#include "cli/quantity.h"
+#include "core/quantity.h"
 #include "core/output_folder.h"
 
 namespace sateen::cli {

@@ -19,6 +19,7 @@
 #include "cli/capture.h"
 #include "cli/command.h"
 #include "cli/devices.h"
+#include "cli/help.h"
 #include "cli/light.h"
 #include "cli/preview.h"
 #include "cli/serve.h"
@@ -75,6 +76,7 @@ int RunProgram(int argc, const char* const* argv, const Task& task, std::ostream
   app.footer(
       "Exit status: 0 done, 1 internal error, 2 usage, 3 bad or degenerate data, 4 input or "
       "output,\n             5 device, 6 cancelled.");
+  WrapHelp(app);
   const CommandTable table = AddCommands(app);
   app.failure_message([](const CLI::App*, const CLI::Error& error) {
     return fmt::format("sateen: error: {}\nRun with --help for more information.\n", error.what());

@@ -1,18 +1,16 @@
 #pragma once
 
-#include <filesystem>
 #include <iosfwd>
 
 #include "cli/command.h"
 #include "core/task.h"
+#include "pipelines/overview/session_overview.h"
 
 namespace sateen::cli {
 
 // `sateen session overview`.
 struct SessionOverviewArgs {
-  std::filesystem::path session;
-  std::filesystem::path maps;    // of a solve of it; empty: frames alone
-  std::filesystem::path output;  // PNG
+  SessionOverviewOptions options;
 };
 
 void AddSessionOverview(CLI::App& session, SessionOverviewArgs& args);

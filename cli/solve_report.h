@@ -2,12 +2,11 @@
 
 #include <string>
 
-#include "cli/solve.h"
+#include "pipelines/solve/solve.h"
 
 namespace sateen::cli {
 
-// Schema sateen.solve/1 (docs/formats.md): one object; also what solve.json holds.
-[[nodiscard]] std::string JsonReport(const SolveArgs& args, const SolveOutcome& outcome);
-[[nodiscard]] std::string TextReport(const SolveArgs& args, const SolveOutcome& outcome);
+// Returns what `sateen solve` prints without --json: a few lines, the last without its end.
+[[nodiscard]] std::string TextReport(const SolveOptions& options, const SolveOutcome& outcome);
 
 }  // namespace sateen::cli

@@ -5,17 +5,16 @@
 #include <chrono>
 #include <nlohmann/json.hpp>
 #include <ostream>
-#include <sstream>
 #include <utility>
 
 #include "cli/bench/peak_memory.h"
-#include "cli/simulate.h"
-#include "cli/solve.h"
 #include "core/output_folder.h"
 #include "core/parallel.h"
 #include "core/scratch_folder.h"
 #include "imaging/raw.h"
 #include "pipelines/calibrate/calibrate_lights.h"
+#include "pipelines/simulate/simulate.h"
+#include "pipelines/solve/solve.h"
 #include "simulation/rigs.h"
 
 namespace sateen::cli {
@@ -73,21 +72,6 @@ class CalibrateBench {
     return (scratch_.Path() / name).string();
   }
 
-  // What a subcommand printed as JSON.
-  template <typename Run, typename Args>
-  [[nodiscard]] Result<json> Command(const Run& run, const Args& args) const {
-    std::ostringstream out;
-    std::ostringstream log;
-    if (run(args, Quiet(), out, log) != 0) {
-      if (Status status = task_.CheckCancelled(); !status) {
-        return tl::unexpected(status.error());
-      }
-      return Fail(ErrorCode::kBadData, "a step of the bench failed: {}", log.str());
-    }
-    json result = json::parse(out.str(), nullptr, /*allow_exceptions=*/false);
-    return result;
-  }
-
   Status WriteRigs() {
     rig_ = RingRig(report_.size, LightModel::kNear, kFieldMm);
     report_.lights = static_cast<int>(rig_.lights.size());
@@ -98,8 +82,8 @@ class CalibrateBench {
     if (Status status = WriteFileWhole(Path(name + ".json"), scene.dump()); !status) {
       return status;
     }
-    const SimulateArgs args{.scene = Path(name + ".json"), .output = Path(name)};
-    const Result<json> done = Command(RunSimulate, args);
+    const SimulateOptions options{.scene = Path(name + ".json"), .output = Path(name)};
+    const Result<SceneFile> done = SimulateSession(options, Quiet());
     task_.Advance();
     return done ? Status() : Status(tl::unexpected(done.error()));
   }
@@ -203,18 +187,17 @@ class CalibrateBench {
                                      {"flat and 4 tilts", "five.json"},
                                      {"one flat", "one.json"},
                                      {"the ruler", "ruler.json"}}) {
-      SolveArgs args{.capture = Path(kFabric),
-                     .output = Path("maps"),
-                     .rig_file = Path(rig),
-                     .robust = "none",  // what the lights do, not what an estimator makes of it
-                     .threads = args_.threads,
-                     .json = true};
-      const Result<json> done = Command(RunSolve, args);
+      const SolveOptions options{.capture = Path(kFabric),
+                                 .output = Path("maps"),
+                                 .rig_file = Path(rig),
+                                 .robust = std::nullopt};  // what the lights do, not an estimator
+      const Result<SolveOutcome> done = SolveSession(options, Quiet());
       if (!done) {
         return tl::unexpected(done.error());
       }
-      report_.fabric.push_back({label, done->at("low_frequency_error_deg").at("max").get<double>(),
-                                done->at("angular_error_deg").at("mean").get<double>()});
+      const Evaluation& evaluation = done->evaluation;
+      report_.fabric.push_back(
+          {label, evaluation.low_frequency_error_deg->max, evaluation.angular_error_deg->mean});
       task_.Advance();
     }
     return {};

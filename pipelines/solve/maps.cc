@@ -16,7 +16,7 @@ namespace {
 
 constexpr double kHeatPercentile = 0.99;
 
-// The 99th percentile over the known pixels, which becomes white.
+// Returns the 99th percentile over the known pixels, which becomes white.
 float TopOf(const Image<float>& values, const Image<uint8_t>& known) {
   std::vector<float> counted;
   for (size_t p = 0; p < values.pixels.size(); ++p) {
@@ -57,15 +57,15 @@ std::span<const Image<T>> One(const Image<T>& image) {
 
 }  // namespace
 
-MapsWriter::MapsWriter(ImageSize size_px, const MapsOptions& options)
-    : options_(options),
+MapsWriter::MapsWriter(ImageSize size_px, NormalY normal_y)
+    : normal_y_(normal_y),
       small_normal_(size_px, kOverviewPanelWidthPx, 3),
       small_albedo_(size_px, kOverviewPanelWidthPx, 3),
       small_quality_(size_px, kOverviewPanelWidthPx, 1) {}
 
-Result<MapsWriter> MapsWriter::Begin(ImageSize size_px, const MapsOptions& options,
+Result<MapsWriter> MapsWriter::Begin(ImageSize size_px, const MapsFacts& facts, bool has_error,
                                      OutputFolder& folder) {
-  MapsWriter writer(size_px, options);
+  MapsWriter writer(size_px, facts.normal_y);
   Status status;
   const auto open = [&]<typename T>(T /*kind*/, const char* name, size_t channels, bool is_wanted,
                                     std::optional<BandWriter>& file) {
@@ -85,16 +85,17 @@ Result<MapsWriter> MapsWriter::Begin(ImageSize size_px, const MapsOptions& optio
   open(float(), "residual.exr", 1, true, writer.residual_);
   open(uint8_t(), "samples.png", 1, true, writer.samples_);
   open(uint8_t(), "reason.png", 1, true, writer.reason_);
-  open(float(), "uncertainty.exr", 1, options.has_ladder, writer.uncertainty_);
-  open(float(), "albedo_uncertainty.exr", 1, options.has_ladder, writer.albedo_uncertainty_);
-  open(uint8_t(), "model.png", 1, options.has_ladder, writer.model_);
-  open(float(), "error.exr", 1, options.has_error, writer.error_);
+  open(float(), "uncertainty.exr", 1, facts.has_ladder, writer.uncertainty_);
+  open(float(), "albedo_uncertainty.exr", 1, facts.has_ladder, writer.albedo_uncertainty_);
+  open(uint8_t(), "model.png", 1, facts.has_ladder, writer.model_);
+  open(float(), "error.exr", 1, has_error, writer.error_);
   return status ? Result<MapsWriter>(std::move(writer)) : tl::unexpected(status.error());
 }
 
 Status MapsWriter::Add(const NormalField& band, const Image<float>* angular_error_deg) {
-  const Image3 flipped = options_.normal_y_down ? WithYDown(band.normal) : Image3();
-  const Image3& normal = options_.normal_y_down ? flipped : band.normal;
+  const bool is_down = normal_y_ == NormalY::kDown;
+  const Image3 flipped = is_down ? WithYDown(band.normal) : Image3();
+  const Image3& normal = is_down ? flipped : band.normal;
   // Deflating the one picture that is not mostly zeros takes as long as all the others together.
   std::future<Status> as_png =
       std::async(std::launch::async, [&] { return normal_png_->Write(EncodeNormal16(normal)); });
@@ -149,18 +150,16 @@ Status MapsWriter::Finish(const Image3& first_frame, OutputFolder& folder) {
 }
 
 Status StageMaps(const NormalField& field, const LightFrame& first_frame,
-                 const std::optional<Image<float>>& angular_error_deg, const MapsOptions& options,
+                 const std::optional<Image<float>>& angular_error_deg, const MapsFacts& facts,
                  OutputFolder& folder) {
-  MapsOptions of_field = options;
-  of_field.has_ladder = !field.model.pixels.empty();
-  of_field.has_error = angular_error_deg.has_value();
   Thumbnail frame(first_frame.rgb.Size(), kOverviewPanelWidthPx, 3);
   frame.Add(0, first_frame.rgb.planes, nullptr);
-  return MapsWriter::Begin(field.reason.Size(), of_field, folder).and_then([&](MapsWriter writer) {
-    return writer.Add(field, angular_error_deg ? &*angular_error_deg : nullptr).and_then([&] {
-      return writer.Finish(frame.Means(), folder);
-    });
-  });
+  return MapsWriter::Begin(field.reason.Size(), facts, angular_error_deg.has_value(), folder)
+      .and_then([&](MapsWriter writer) {
+        return writer.Add(field, angular_error_deg ? &*angular_error_deg : nullptr).and_then([&] {
+          return writer.Finish(frame.Means(), folder);
+        });
+      });
 }
 
 }  // namespace sateen

@@ -9,37 +9,37 @@
 #include "imaging/band_writer.h"
 #include "imaging/light_stack.h"
 #include "imaging/show/thumbnail.h"
+#include "pipelines/solve/maps_facts.h"
 #include "solver/lambertian.h"
 
 namespace sateen {
 
 inline constexpr int kOverviewPanelWidthPx = 640;
 
-struct MapsOptions {
-  bool normal_y_down = false;  // the DirectX convention instead of OpenGL's
-  bool has_ladder = false;     // uncertainty.exr, albedo_uncertainty.exr and model.png, too
-  bool has_error = false;      // error.exr, too
-};
-
-/// Stages the maps of a solve, band by band from the top: normal.exr and .png, albedo.exr,
-/// residual.exr, samples.png, reason.png, of a ladder uncertainty.exr, albedo_uncertainty.exr and model.png,
-/// the angular error as error.exr, and at the end overview.png: a frame, the normals, the albedo, and the error or,
-/// without truth, the residual. The same files for the same maps, however they are cut.
+/// Stages the maps of a solve, band by band from the top:
+///
+///     normal.exr, normal.png, albedo.exr, residual.exr, samples.png, reason.png
+///     uncertainty.exr, albedo_uncertainty.exr, model.png   of a ladder
+///     error.exr        angular error in degrees, where there is truth
+///     overview.png     a frame, the normals, the albedo, and the error or else the residual
+///
+/// The files are the same for the same maps, however they are cut into bands.
 class MapsWriter {
  public:
-  [[nodiscard]] static Result<MapsWriter> Begin(ImageSize size_px, const MapsOptions& options,
-                                                OutputFolder& folder);
+  [[nodiscard]] static Result<MapsWriter> Begin(ImageSize size_px, const MapsFacts& facts,
+                                                bool has_error, OutputFolder& folder);
 
-  // The next rows; `angular_error_deg` of them where there is one.
+  // Writes the next rows, and their `angular_error_deg` where the maps have one.
   [[nodiscard]] Status Add(const NormalField& band,
                            const Image<float>* angular_error_deg = nullptr);
-  // `first_frame`: shrunk as Thumbnail(size_px, kOverviewPanelWidthPx, 3) does.
+  // Closes the files and writes the overview. `first_frame` is as small as
+  // Thumbnail(size_px, kOverviewPanelWidthPx, 3) makes it.
   [[nodiscard]] Status Finish(const Image3& first_frame, OutputFolder& folder);
 
  private:
-  MapsWriter(ImageSize size_px, const MapsOptions& options);
+  MapsWriter(ImageSize size_px, NormalY normal_y);
 
-  MapsOptions options_;
+  NormalY normal_y_;
   int next_row_ = 0;
   std::optional<BandWriter> normal_;
   std::optional<BandWriter> normal_png_;
@@ -56,9 +56,9 @@ class MapsWriter {
   Thumbnail small_quality_;
 };
 
-// Maps that are there whole.
+// Stages maps that are held whole. error.exr is among them where there is an error.
 [[nodiscard]] Status StageMaps(const NormalField& field, const LightFrame& first_frame,
                                const std::optional<Image<float>>& angular_error_deg,
-                               const MapsOptions& options, OutputFolder& folder);
+                               const MapsFacts& facts, OutputFolder& folder);
 
 }  // namespace sateen

@@ -11,7 +11,7 @@ namespace sateen {
 namespace {
 
 constexpr int kRowsAtOnce = 256;  // even, so that every band begins with the same colours
-// Of a band: its maps and what is on its way to the files take some 100 bytes a pixel.
+// Pixels per band: its maps and what waits to be written take some 100 bytes per pixel.
 constexpr int kPixelsOfBand = 1 << 20;
 
 Image3 ColoursOf(const MosaicStack& stack, size_t frame, int begin, int end) {
@@ -51,15 +51,12 @@ LightFrame ShowFrame(const MosaicStack& stack, size_t frame) {
 
 Result<SolveSummary> SolveIntoMaps(const MosaicStack& stack, const Rig& rig,
                                    const std::optional<Mask>& mask, const MosaicOptions& options,
-                                   const MapsOptions& maps, const Task& task,
-                                   OutputFolder& folder) {
+                                   const MapsFacts& facts, const Task& task, OutputFolder& folder) {
   std::future<Image3> first_frame =
       std::async(std::launch::async, [&stack] { return ThumbnailOf(stack, 0); });
   MosaicOptions by_bands = options;
   by_bands.band_rows = std::clamp(kPixelsOfBand / stack.size_px.width, 16, kRowsAtOnce);
-  MapsOptions of_solve = maps;
-  of_solve.has_ladder = options.mode.has_value();
-  Result<MapsWriter> writer = MapsWriter::Begin(stack.size_px, of_solve, folder);
+  Result<MapsWriter> writer = MapsWriter::Begin(stack.size_px, facts, /*has_error=*/false, folder);
   Result<SolveSummary> summary =
       writer ? SolveMosaicByBands(
                    stack, rig, mask, by_bands, task,

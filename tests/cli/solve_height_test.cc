@@ -120,7 +120,7 @@ TEST_F(SolveHeight, IsRefusedWhereNoLightTellsOfItOrOneIsTooLow) {
   for (const char* height : {"198", "50", "-60", "nan", "inf"}) {
     const RunResult run = SolveSession({"--height", height});
     EXPECT_EQ(run.exit_status, 2) << height;
-    EXPECT_THAT(run.log, HasSubstr("the lowest light hangs 198 mm above the table; need a surface "
+    EXPECT_THAT(run.log, HasSubstr("the lowest light is 198 mm above the table; need a surface "
                                    "within a quarter of that, from -49.5 to 49.5 mm"))
         << height;
   }
@@ -138,7 +138,7 @@ TEST_F(SolveHeight, IsRefusedWhereNoLightTellsOfItOrOneIsTooLow) {
     const RunResult run = Solve(all);
     EXPECT_EQ(run.exit_status, 3);
     EXPECT_THAT(run.log, HasSubstr("all 3 lights are distant"));
-    EXPECT_THAT(run.log, HasSubstr(words[0] + " needs lights with a place"));
+    EXPECT_THAT(run.log, HasSubstr(words[0] + " needs lights with a position"));
   }
 }
 

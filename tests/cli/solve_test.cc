@@ -246,20 +246,6 @@ TEST_F(SolveCommand, AMeanErrorAboveTheLimitFailsAfterWritingAll) {
   EXPECT_EQ(nlohmann::json::parse(record), run.Json());
 }
 
-TEST(Passed, NoNumberIsNotWithinALimit) {
-  cli::SolveArgs args;
-  cli::SolveOutcome outcome;
-  EXPECT_TRUE(cli::Passed(args, outcome));
-  args.fail_above_deg = 2.0;
-  EXPECT_FALSE(cli::Passed(args, outcome));
-  outcome.angular_error_deg = ErrorStatistics{.count = 1, .mean = 2.0};
-  EXPECT_TRUE(cli::Passed(args, outcome));
-  outcome.angular_error_deg->mean = std::nextafter(2.0, 3.0);
-  EXPECT_FALSE(cli::Passed(args, outcome));
-  outcome.angular_error_deg->mean = std::nan("");
-  EXPECT_FALSE(cli::Passed(args, outcome));
-}
-
 TEST_F(SolveCommand, ALimitWithNothingToCompareFails) {
   Image3 unknown = ReadImage3(Path("session/truth/normal.exr")).value();
   unknown = Image3(unknown.Size());  // zero: not known

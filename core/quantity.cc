@@ -1,10 +1,10 @@
-#include "cli/quantity.h"
+#include "core/quantity.h"
 
 #include <charconv>
 #include <cmath>
 #include <optional>
 
-namespace sateen::cli {
+namespace sateen {
 namespace {
 
 struct Quantity {
@@ -83,4 +83,4 @@ std::string DurationText(std::chrono::milliseconds time) {
 
 std::string LevelText(double level) { return fmt::format("{:.4g} %", 100.0 * level); }
 
-}  // namespace sateen::cli
+}  // namespace sateen

@@ -1,8 +1,8 @@
-#include "cli/quantity.h"
+#include "core/quantity.h"
 
 #include <gmock/gmock.h>
 
-namespace sateen::cli::quantity_test {
+namespace sateen::quantity_test {
 namespace {
 
 using std::chrono::milliseconds;
@@ -39,4 +39,4 @@ TEST(Quantity, WritesThemForPeople) {
 }
 
 }  // namespace
-}  // namespace sateen::cli::quantity_test
+}  // namespace sateen::quantity_test

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <optional>
+#include <string_view>
+
+#include "rig/camera.h"
+#include "rig/rig.h"
+
+namespace sateen {
+
+struct SolveOptions;
+
+// Direction of y in normal maps.
+enum class NormalY {
+  kUp,   // OpenGL, glTF
+  kDown  // DirectX
+};
+
+// "up", "down".
+[[nodiscard]] std::string_view Name(NormalY normal_y);
+
+// Facts that hold for all maps of a solve, whichever way they are written.
+struct MapsFacts {
+  NormalY normal_y = NormalY::kUp;
+  // Whether uncertainty.exr, albedo_uncertainty.exr and model.png are among the maps.
+  bool has_ladder = false;
+  // Camera whose pixels the maps have; absent where the rig has none.
+  std::optional<Camera> camera;
+};
+
+// Returns the facts of a solve with `rig`, whose table plane is the surface: lifted by
+// options.height_mm. With options.undistort the maps' camera is the rig's without distortion.
+[[nodiscard]] MapsFacts MapsFactsOf(const SolveOptions& options, const Rig& rig);
+
+}  // namespace sateen
