@@ -93,12 +93,17 @@ std::string_view Name(ErrorCode code) {
 }
 
 std::string BusyText(const JobRecord& holder) {
-  return fmt::format(
-      "the rig is in use: {}{}{} by {} since {} (job {}); wait for its end, or end it: Ctrl-C "
-      "where "
-      "it was started, or sateen light off",
-      holder.kind, holder.what.empty() ? "" : " of ", holder.what, holder.owner,
-      TimeText(holder.since), holder.id);
+  const std::string job =
+      fmt::format("{}{}{} by {} since {} (job {})", holder.kind, holder.what.empty() ? "" : " of ",
+                  holder.what, holder.owner, TimeText(holder.since), holder.id);
+  return holder.has_rig
+             ? fmt::format(
+                   "the rig is in use: {}; wait for its end, or end it: Ctrl-C where it was "
+                   "started, or sateen light off",
+                   job)
+             : fmt::format(
+                   "a {} is running: {}; wait for its end, or cancel it: DELETE /v1/jobs/{}",
+                   holder.kind, job, holder.id);
 }
 
 std::string StateJson(const RigState& state, const std::string& version) {

@@ -8,6 +8,7 @@
 #include "scanner/daemon/answer_json.h"
 #include "scanner/daemon/api_json.h"
 #include "scanner/daemon/rig_jobs.h"
+#include "scanner/daemon/solve_job.h"
 
 namespace sateen {
 namespace {
@@ -171,8 +172,12 @@ std::optional<ApiResponse> Api::CannotBegin(const Status& checked) const {
 }
 
 ApiResponse Api::PostJob(const ApiRequest& request, Parameter /*none*/) const {
-  if (KindOfJob(request.body) == "preview") {
+  const std::string kind = KindOfJob(request.body);
+  if (kind == "preview") {
     return PostPreviewJob(request);
+  }
+  if (kind == "solve") {
+    return PostSolveJob(request);
   }
   const Result<PostedCapture> posted = CaptureFromJson(request.body, options_.capture);
   if (!posted) {
@@ -201,6 +206,15 @@ ApiResponse Api::PostPreviewJob(const ApiRequest& request) const {
   }
   return Begin(
       PreviewJob(posted->request, posted->output, nullptr, OwnerName(posted->client, request.who)));
+}
+
+ApiResponse Api::PostSolveJob(const ApiRequest& request) const {
+  Result<PostedSolve> posted = SolveFromJson(request.body);
+  if (!posted) {
+    return Refused(400, posted.error());
+  }
+  std::string owner = OwnerName(posted->client, request.who);
+  return Begin(SolveJob(std::move(posted->request), std::move(owner)));
 }
 
 ApiResponse Api::GetJob(const ApiRequest& /*request*/, Parameter id) const {

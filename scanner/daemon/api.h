@@ -73,6 +73,7 @@ class Api {
   [[nodiscard]] ApiResponse PostLight(const ApiRequest& request, Parameter channel) const;
 
   [[nodiscard]] ApiResponse PostPreviewJob(const ApiRequest& request) const;
+  [[nodiscard]] ApiResponse PostSolveJob(const ApiRequest& request) const;
   // What the job would end with at once; nothing where it may begin or another has the rig.
   [[nodiscard]] std::optional<ApiResponse> CannotBegin(const Status& checked) const;
   [[nodiscard]] ApiResponse Begin(JobRequest job) const;     // 202, or 409

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "core/json.h"
+#include "scanner/daemon/request_json.h"
 
 namespace sateen {
 namespace {
@@ -14,64 +15,16 @@ namespace {
 using nlohmann::ordered_json;
 using std::chrono::milliseconds;
 
-constexpr std::string_view kWhere = "request";
 constexpr std::pair<SessionKind, std::string_view> kKinds[] = {{SessionKind::kFabric, "fabric"},
                                                                {SessionKind::kSheet, "sheet"},
                                                                {SessionKind::kChart, "chart"},
                                                                {SessionKind::kBoard, "board"}};
-
-// One JSON object; an empty body is an object without keys.
-Result<nlohmann::json> ParseRequest(const std::string& text) {
-  Result<nlohmann::json> json = ParseJson(text.empty() ? "{}" : text, std::string(kWhere));
-  if (!json) {
-    return Fail(ErrorCode::kInvalidArgument, "{}", json.error().message);
-  }
-  if (!json->is_object()) {
-    return Fail(ErrorCode::kInvalidArgument,
-                "request is a JSON {}; need an object, as {{\"rig\": "
-                "\"/home/me/rig.json\"}}",
-                json->type_name());
-  }
-  return json;
-}
-
-// Closes a reader: what is wrong with a request is wrong with its arguments.
-Status FinishRequest(JsonReader& json) {
-  const Status status = json.Finish();
-  return status ? Status{} : Fail(ErrorCode::kInvalidArgument, "{}", status.error().message);
-}
-
-std::string ReadClient(JsonReader& json) {
-  std::string client = json.OptionalString("client").value_or("");
-  const bool printable = std::ranges::none_of(
-      client, [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; });
-  json.Require(client.size() <= 100 && printable, "client",
-               "is longer than 100 bytes or not printable; need a short name");
-  return client;
-}
-
-std::filesystem::path ReadPath(JsonReader& json, std::string_view key) {
-  const std::string text = json.OptionalString(key).value_or("");
-  json.Require(text.empty() || text.front() == '/', key,
-               fmt::format("is '{}'; need an absolute path, as /home/me/scans/twill", text));
-  json.Require(text.find('\0') == std::string::npos, key, "has a zero byte in it; need a path");
-  return text;
-}
 
 std::optional<milliseconds> ReadTime(JsonReader& json, std::string_view key) {
   const std::optional<int> ms = json.OptionalInteger(key);
   json.Require(!ms || *ms >= 0, key, fmt::format("is {}; need milliseconds", ms.value_or(0)));
   return ms ? std::optional(milliseconds(*ms)) : std::nullopt;
 }
-
-template <typename T>
-void Take(const std::optional<T>& found, T& into) {
-  if (found) {
-    into = *found;
-  }
-}
-
-bool TakeFlag(JsonReader& json, std::string_view key) { return json.Has(key) && json.Boolean(key); }
 
 SessionKind ReadSessionKindOr(JsonReader& json, SessionKind otherwise) {
   const std::optional<std::string> text = json.OptionalString("session_kind");
@@ -155,9 +108,10 @@ Result<PostedCapture> CaptureFromJson(const std::string& text, const CaptureOpti
   if (!parsed) {
     return tl::unexpected(parsed.error());
   }
-  JsonReader json(*parsed, std::string(kWhere));
+  JsonReader json(*parsed, std::string(kRequest));
   const std::string kind = json.String("kind");
-  json.Require(kind == "capture", "kind", fmt::format("is '{}'; need capture or preview", kind));
+  json.Require(kind == "capture", "kind",
+               fmt::format("is '{}'; need capture, preview or solve", kind));
   PostedCapture posted = {.client = ReadClient(json), .request = {.options = defaults}};
   CaptureRequest& request = posted.request;
   request.rig = ReadPath(json, "rig");
@@ -220,7 +174,7 @@ Result<PostedPreview> PreviewFromJson(const std::string& text) {
   if (parsed->contains("light") && (*parsed)["light"].is_number_integer()) {
     (*parsed)["light"] = (*parsed)["light"].dump();
   }
-  JsonReader json(*parsed, std::string(kWhere));
+  JsonReader json(*parsed, std::string(kRequest));
   PostedPreview posted = {.client = ReadClient(json)};
   const std::string kind = json.OptionalString("kind").value_or("preview");
   json.Require(kind == "preview", "kind", fmt::format("is '{}'; need preview", kind));
@@ -271,7 +225,7 @@ Result<PostedLight> LightFromJson(const std::string& text, int channel) {
   if (!parsed) {
     return tl::unexpected(parsed.error());
   }
-  JsonReader json(*parsed, std::string(kWhere));
+  JsonReader json(*parsed, std::string(kRequest));
   PostedLight posted = {.client = ReadClient(json), .request = {.channel = channel}};
   posted.request.name = json.OptionalString("name").value_or("");
   json.Require(posted.request.name.size() <= 100, "name", "is longer than 100 bytes");
@@ -302,7 +256,7 @@ Result<PostedBoardChange> BoardChangeFromJson(const std::string& text) {
   if (!parsed) {
     return tl::unexpected(parsed.error());
   }
-  JsonReader json(*parsed, std::string(kWhere));
+  JsonReader json(*parsed, std::string(kRequest));
   PostedBoardChange posted = {.client = ReadClient(json)};
   BoardChange& change = posted.change;
   change.clear_fault = TakeFlag(json, "clear_fault");

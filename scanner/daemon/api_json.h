@@ -8,6 +8,7 @@
 #include "scanner/capture/preview.h"
 #include "scanner/daemon/board_job.h"
 #include "scanner/daemon/light_job.h"
+#include "scanner/daemon/solve_job.h"
 
 // What the daemon is asked, as JSON and back; docs/api.md has the keys. A key that a request shall have
 // is added to its two functions here. Readers are strict: an unknown key, a wrong type and a value out
@@ -20,7 +21,7 @@ struct PostedCapture {
   CaptureRequest request;
   bool dry_run = false;  // only what it would do
 };
-// "capture" or "preview"; empty where the text does not say.
+// "capture", "preview" or "solve"; empty where the text does not say.
 [[nodiscard]] std::string KindOfJob(const std::string& text);
 // What the text does not say is as in `defaults`.
 [[nodiscard]] Result<PostedCapture> CaptureFromJson(const std::string& text,
@@ -37,6 +38,12 @@ struct PostedPreview {
 [[nodiscard]] std::string PreviewToJson(const PreviewRequest& request,
                                         const std::filesystem::path& output,
                                         const std::string& client);
+
+struct PostedSolve {
+  std::string client;
+  SolveRequest request;
+};
+[[nodiscard]] Result<PostedSolve> SolveFromJson(const std::string& text);
 
 struct PostedLight {
   std::string client;

@@ -25,7 +25,7 @@ enum class JobState { kRunning, kDone, kFailed };
 // Who asks for something, in words that tell another person whom to talk to.
 struct JobRecord {
   std::uint64_t id = 0;
-  std::string kind;   // "capture", "light", "devices", "board", "lights off"
+  std::string kind;   // "capture", "light", "devices", "board", "lights off", "solve"
   std::string what;   // the folder of a capture, the light
   std::string owner;  // who asked: "process 4711 (sateen) of alice"
   std::chrono::system_clock::time_point since;
@@ -34,15 +34,17 @@ struct JobRecord {
   std::string result;          // JSON, of a job that is done
   std::optional<Error> error;  // of one that failed; kCancelled: somebody cancelled it
   std::uint64_t last_event = 0;
+  bool has_rig = true;  // whether it has board and camera to itself
 };
 
-// What a job works with. Its calls come from the job's own thread.
+// The means of a job's work. All but Report() is for the job's own thread.
 class JobContext {
  public:
   virtual ~JobContext() = default;
+  // Board and camera; only of a job that has the rig.
   [[nodiscard]] virtual RigDevices& Devices() = 0;
   [[nodiscard]] virtual const Task& GetTask() const = 0;
-  // `json` is one line; those who follow the job get it.
+  // Sends one line of JSON to those who follow the job. From any thread.
   virtual void Report(std::string json) = 0;
   // Before a light goes on: the channels that may be on from now on.
   virtual void Lit(std::vector<int> channels) = 0;
@@ -55,6 +57,8 @@ struct JobRequest {
   std::string kind;
   std::string what;
   std::string owner;
+  // False: the job needs neither board nor camera, and runs beside one that has the rig.
+  bool needs_rig = true;
   JobWork work;
 };
 

@@ -4,13 +4,14 @@
 #include <exception>
 #include <utility>
 
+#include "core/check.h"
 #include "scanner/daemon/answer_json.h"
 
 namespace sateen {
 namespace {
 
 constexpr std::size_t kEventsKept = 1000;
-constexpr std::size_t kJobsKept = 21;  // the running one, and 20 that have ended
+constexpr std::ptrdiff_t kEndedJobsKept = 20;
 
 }  // namespace
 
@@ -18,7 +19,10 @@ class RigService::Context : public JobContext {
  public:
   Context(RigService& service, Job& job)
       : service_(service), job_(job), task_{.cancel = &job.cancel} {}
-  RigDevices& Devices() override { return *service_.devices_; }
+  RigDevices& Devices() override {
+    SATEEN_CHECK(job_.record.has_rig);
+    return *service_.devices_;
+  }
   const Task& GetTask() const override { return task_; }
   void Report(std::string json) override {
     const std::lock_guard lock(service_.mutex_);
@@ -35,8 +39,10 @@ class RigService::Context : public JobContext {
   Task task_;
 };
 
-RigService::RigService(std::unique_ptr<RigDevices> devices)
-    : devices_(std::move(devices)), thread_([this] { RunJobs(); }) {}
+RigService::RigService(std::unique_ptr<RigDevices> devices) : devices_(std::move(devices)) {
+  rig_.thread = std::thread([this] { RunJobs(rig_); });
+  desk_.thread = std::thread([this] { RunJobs(desk_); });
+}
 
 RigService::~RigService() { Stop(); }
 
@@ -46,9 +52,10 @@ tl::expected<std::uint64_t, JobRefusal> RigService::Begin(JobRequest request) {
     return tl::unexpected<JobRefusal>(
         {.error = {ErrorCode::kDevice, "the daemon is ending; start it again"}});
   }
-  if (running_ != nullptr) {
-    JobRefusal refusal = {.error = {ErrorCode::kDevice, BusyText(running_->record)}};
-    refusal.holder = running_->record;
+  Lane& lane = request.needs_rig ? rig_ : desk_;
+  if (lane.running != nullptr) {
+    JobRefusal refusal = {.error = {ErrorCode::kDevice, BusyText(lane.running->record)}};
+    refusal.holder = lane.running->record;
     return tl::unexpected(std::move(refusal));
   }
   auto job = std::make_unique<Job>();
@@ -56,15 +63,14 @@ tl::expected<std::uint64_t, JobRefusal> RigService::Begin(JobRequest request) {
                  .kind = std::move(request.kind),
                  .what = std::move(request.what),
                  .owner = std::move(request.owner),
-                 .since = std::chrono::system_clock::now()};
+                 .since = std::chrono::system_clock::now(),
+                 .has_rig = request.needs_rig};
   job->work = std::move(request.work);
-  running_ = job.get();
+  lane.running = job.get();
   jobs_.push_back(std::move(job));
-  if (jobs_.size() > kJobsKept) {
-    jobs_.pop_front();
-  }
+  ForgetOldJobs();
   changed_.notify_all();
-  return running_->record.id;
+  return lane.running->record.id;
 }
 
 tl::expected<JobRecord, JobRefusal> RigService::RunToEnd(JobRequest request) {
@@ -86,11 +92,11 @@ tl::expected<JobRecord, JobRefusal> RigService::RunToEnd(JobRequest request) {
 RigState RigService::State() const {
   const std::lock_guard lock(mutex_);
   RigState state = {.board = board_, .camera = camera_, .lit = lit_, .lights_fault = lights_fault_};
-  if (running_ != nullptr) {
-    state.job = running_->record;
+  if (rig_.running != nullptr) {
+    state.job = rig_.running->record;
   }
   for (const auto& job : jobs_) {
-    if (job.get() != running_) {
+    if (job.get() != rig_.running && job->record.has_rig) {
       state.last_job = job->record;
     }
   }
@@ -136,7 +142,7 @@ bool RigService::Cancel(std::uint64_t id, const std::string& who) {
   if (job == nullptr) {
     return false;
   }
-  if (job == running_ && !job->cancel) {
+  if (job->record.state == JobState::kRunning && !job->cancel) {
     job->cancelled_by = who;
     job->cancel = true;
   }
@@ -145,41 +151,49 @@ bool RigService::Cancel(std::uint64_t id, const std::string& who) {
 
 bool RigService::WaitIdle(std::chrono::milliseconds longest) const {
   std::unique_lock lock(mutex_);
-  return changed_.wait_for(lock, longest, [&] { return running_ == nullptr; });
+  return changed_.wait_for(lock, longest, [&] { return rig_.running == nullptr; });
 }
 
 void RigService::Stop() {
   {
     const std::lock_guard lock(mutex_);
-    if (!thread_.joinable()) {
+    if (stopping_) {
       return;
     }
     stopping_ = true;
-    if (running_ != nullptr && !running_->cancel) {
-      running_->cancelled_by = "the end of the daemon";
-      running_->cancel = true;
+    for (Job* job : {rig_.running, desk_.running}) {
+      if (job != nullptr && !job->cancel) {
+        job->cancelled_by = "the end of the daemon";
+        job->cancel = true;
+      }
     }
     changed_.notify_all();
   }
-  thread_.join();
+  rig_.thread.join();
+  desk_.thread.join();
+  devices_->Release();
 }
 
-void RigService::RunJobs() {
+void RigService::RunJobs(Lane& lane) {
   while (true) {
     Job* job = nullptr;
     {
       std::unique_lock lock(mutex_);
-      changed_.wait(lock, [&] { return stopping_ || running_ != nullptr; });
-      job = running_;
+      changed_.wait(lock, [&] { return stopping_ || lane.running != nullptr; });
+      job = lane.running;
     }
     if (job == nullptr) {
-      break;
+      return;
     }
     Result<std::string> result = Work(*job);
-    std::string fault = ConfirmLightsOff();
-    End(*job, std::move(result), std::move(fault));
+    const bool has_rig = job->record.has_rig;
+    std::string fault = has_rig ? ConfirmLightsOff() : std::string();
+    const std::lock_guard lock(mutex_);
+    if (has_rig) {
+      NoteRig(std::move(fault));
+    }
+    End(*job, std::move(result));
   }
-  devices_->Release();
 }
 
 Result<std::string> RigService::Work(Job& job) {
@@ -221,14 +235,16 @@ std::string RigService::ConfirmLightsOff() {
          fault;
 }
 
-void RigService::End(Job& job, Result<std::string> result, std::string lights_fault) {
-  const std::lock_guard lock(mutex_);
+void RigService::NoteRig(std::string lights_fault) {
   lit_.clear();
   lights_fault_ = std::move(lights_fault);
   camera_ = devices_->OpenCamera();
   if (!lights_fault_.empty()) {
     board_.reset();
   }
+}
+
+void RigService::End(Job& job, Result<std::string> result) {
   JobRecord& record = job.record;
   record.ended = std::chrono::system_clock::now();
   if (result) {
@@ -243,8 +259,15 @@ void RigService::End(Job& job, Result<std::string> result, std::string lights_fa
     }
     Append(job, "failed", ErrorJson(*record.error));
   }
-  running_ = nullptr;
+  LaneOf(record).running = nullptr;
   changed_.notify_all();
+}
+
+void RigService::ForgetOldJobs() {
+  const auto has_ended = [](const auto& job) { return job->record.state != JobState::kRunning; };
+  for (auto ended = std::ranges::count_if(jobs_, has_ended); ended > kEndedJobsKept; --ended) {
+    jobs_.erase(std::ranges::find_if(jobs_, has_ended));
+  }
 }
 
 void RigService::Append(Job& job, std::string type, std::string data) {

@@ -21,7 +21,8 @@ namespace sateen {
 // Why a job was not begun.
 struct JobRefusal {
   Error error;
-  std::optional<JobRecord> holder;  // the job that has the rig; absent where the daemon is ending
+  // Job that has the rig, or runs beside it, in the way; absent where the daemon is ending.
+  std::optional<JobRecord> holder;
 };
 
 // The board as it last said it.
@@ -35,8 +36,8 @@ struct KnownBoard {
 struct RigState {
   std::optional<KnownBoard> board;
   std::optional<CameraInfo> camera;
-  std::optional<JobRecord> job;       // the one that runs
-  std::optional<JobRecord> last_job;  // the latest that has ended
+  std::optional<JobRecord> job;       // the one that has the rig
+  std::optional<JobRecord> last_job;  // the latest with the rig that has ended
   std::vector<int> lit;               // channels that may be on; none where no job runs
   std::string lights_fault;           // why the board's word that all is off is missing; else empty
 };
@@ -57,6 +58,9 @@ struct FollowedEvents {
 /// A job counts as running until its lights are off, so that no light is ever on while the state says
 /// that no job runs. Begin while a job runs is refused at once with who has the rig since when; there
 /// is no queue. All calls may come from any thread.
+///
+/// A job that needs no devices, as a solve, runs in a thread of its own beside the job that has the
+/// rig: neither waits for the other. There is one such job at a time.
 ///
 /// Of each job the latest 1000 events are kept, and of ended jobs the latest 20.
 class RigService {
@@ -82,10 +86,10 @@ class RigService {
 
   // Tells the job to stop; it has ended when its last event says so. False: not known.
   bool Cancel(std::uint64_t id, const std::string& who);
-  // Waits until no job runs; false where one still does after `longest`.
+  // Waits until no job has the rig; false where one still does after `longest`.
   bool WaitIdle(std::chrono::milliseconds longest) const;
 
-  // Refuses new jobs, cancels the running one, waits for its end, turns all lights off and closes the
+  // Refuses new jobs, cancels the running ones, waits for their end, turns all lights off and closes the
   // devices. The second time it does nothing.
   void Stop();
 
@@ -98,28 +102,36 @@ class RigService {
     std::string cancelled_by;
   };
   class Context;
+  // Runs one job at a time.
+  struct Lane {
+    Job* running = nullptr;
+    std::thread thread;
+  };
 
-  void RunJobs();
+  [[nodiscard]] Lane& LaneOf(const JobRecord& job) { return job.has_rig ? rig_ : desk_; }
+  void RunJobs(Lane& lane);
   [[nodiscard]] Result<std::string> Work(Job& job);
   // The board's word that all is off; what is wrong where it cannot be had.
   [[nodiscard]] std::string ConfirmLightsOff();
-  void End(Job& job, Result<std::string> result, std::string lights_fault);
+  void NoteRig(std::string lights_fault);                     // with the mutex held
+  void End(Job& job, Result<std::string> result);             // with the mutex held
+  void ForgetOldJobs();                                       // with the mutex held
   void Append(Job& job, std::string type, std::string data);  // with the mutex held
   [[nodiscard]] Job* Known(std::uint64_t id) const;           // with the mutex held
 
-  std::unique_ptr<RigDevices> devices_;  // of the job thread alone
+  std::unique_ptr<RigDevices> devices_;  // of the rig's thread alone
 
   mutable std::mutex mutex_;  // for all below
   mutable std::condition_variable changed_;
   std::deque<std::unique_ptr<Job>> jobs_;  // the latest last
-  Job* running_ = nullptr;
   std::uint64_t next_id_ = 1;
   std::optional<KnownBoard> board_;
   std::optional<CameraInfo> camera_;
   std::vector<int> lit_;
   std::string lights_fault_;
   bool stopping_ = false;
-  std::thread thread_;
+  Lane rig_;
+  Lane desk_;  // of jobs without devices
 };
 
 }  // namespace sateen

@@ -169,5 +169,62 @@ TEST(RigService, StopCancelsTurnsOffAndRefuses) {
   EXPECT_FALSE(refused.error().holder.has_value());
 }
 
+// A job without devices, that runs until it is cancelled.
+JobRequest DeskJob(const std::string& owner) {
+  JobRequest job = WorkJob(
+      [](JobContext& context) -> Result<std::string> {
+        context.Report(R"({"began":true})");
+        while (!context.GetTask().Cancelled()) {
+          std::this_thread::yield();
+        }
+        return tl::unexpected(context.GetTask().CheckCancelled().error());
+      },
+      owner);
+  job.needs_rig = false;
+  return job;
+}
+
+TEST(RigService, AJobWithoutDevicesLeavesTheRigFree) {
+  FakeDaemon daemon;
+  const std::uint64_t desk = *daemon.service.Begin(DeskJob("alice"));
+
+  EXPECT_FALSE(daemon.service.State().job.has_value());
+  const std::uint64_t light = daemon.TurnOn(3, "bob");
+  EXPECT_EQ(daemon.service.State().job->id, light);
+  daemon.service.Cancel(light, "bob");
+  ASSERT_TRUE(daemon.service.WaitIdle(kLong));
+  EXPECT_EQ(daemon.Ask("POST", "/v1/lights/off").status, 200);
+  EXPECT_EQ(daemon.service.Find(desk)->state, JobState::kRunning);  // lights off is not for it
+
+  daemon.service.Cancel(desk, "carol");
+  EXPECT_THAT(AllEvents(daemon.service, desk).back().data, HasSubstr("cancelled by carol"));
+  EXPECT_NE(daemon.service.State().last_job->id, desk);
+}
+
+TEST(RigService, OneJobWithoutDevicesRunsAtATime) {
+  FakeDaemon daemon;
+  const std::uint64_t desk = *daemon.service.Begin(DeskJob("alice"));
+
+  const auto refused = daemon.service.Begin(DeskJob("bob"));
+
+  ASSERT_FALSE(refused.has_value());
+  EXPECT_EQ(refused.error().holder->id, desk);
+  EXPECT_THAT(refused.error().error.message, HasSubstr("DELETE /v1/jobs/1"));
+  daemon.service.Stop();
+  EXPECT_THAT(daemon.service.Find(desk)->error->message, HasSubstr("the end of the daemon"));
+}
+
+TEST(RigService, ARunningJobIsKeptHoweverManyEndMeanwhile) {
+  FakeDaemon daemon;
+  const std::uint64_t desk = *daemon.service.Begin(DeskJob("alice"));
+  for (int k = 0; k < 30; ++k) {
+    ASSERT_TRUE(
+        daemon.service.RunToEnd(WorkJob([](JobContext&) -> Result<std::string> { return "{}"; })));
+  }
+  EXPECT_TRUE(daemon.service.Find(desk).has_value());
+  EXPECT_LE(daemon.service.Jobs().size(), 22U);
+  EXPECT_FALSE(daemon.service.Find(desk + 1).has_value());
+}
+
 }  // namespace
 }  // namespace sateen::rig_service_test
