@@ -3,6 +3,8 @@
 #include <cmath>
 #include <iostream>
 
+#include "pipelines/overview/session_overview.h"
+#include "pipelines/simulate/simulate.h"
 #include "solver/lambertian.h"
 
 int main() {
