@@ -5,6 +5,7 @@
 #include <fcntl.h>
 
 #include <cerrno>
+#include <cmath>
 #include <cstdio>
 #include <exception>
 #include <string>
@@ -130,13 +131,19 @@ BandWriter::~BandWriter() = default;
 
 template <typename T>
 Result<BandWriter> BandWriter::Open(const std::filesystem::path& path, ImageSize size,
-                                    size_t channels) {
+                                    size_t channels, std::optional<double> pixel_mm) {
   SATEEN_CHECK(size.width > 0 && size.height > 0 && (channels == 1 || channels == 3));
   OIIO::ImageSpec spec(size.width, size.height, static_cast<int>(channels),
                        OIIO::BaseTypeFromC<T>::value);
   const bool is_exr = std::is_same_v<T, float>;
   spec.attribute("Compression", is_exr ? "none" : kPngStrategy);
   spec.attribute("png:filter", kPngFilterUp);
+  if (pixel_mm) {
+    const auto per_metre = static_cast<float>(std::round(1000.0 / *pixel_mm));
+    spec.attribute("XResolution", per_metre);
+    spec.attribute("YResolution", per_metre);
+    spec.attribute("ResolutionUnit", "m");
+  }
   spec.attribute("DateTime", "");  // otherwise EXR gets the time of day, and no two files agree
   try {
     auto impl = std::make_unique<Impl>(path.string(), std::move(spec));
@@ -154,12 +161,12 @@ Result<BandWriter> BandWriter::Open(const std::filesystem::path& path, ImageSize
   }
 }
 
-template Result<BandWriter> BandWriter::Open<float>(const std::filesystem::path&, ImageSize,
-                                                    size_t);
+template Result<BandWriter> BandWriter::Open<float>(const std::filesystem::path&, ImageSize, size_t,
+                                                    std::optional<double>);
 template Result<BandWriter> BandWriter::Open<uint8_t>(const std::filesystem::path&, ImageSize,
-                                                      size_t);
+                                                      size_t, std::optional<double>);
 template Result<BandWriter> BandWriter::Open<uint16_t>(const std::filesystem::path&, ImageSize,
-                                                       size_t);
+                                                       size_t, std::optional<double>);
 
 Status BandWriter::Write(std::span<const Image<float>> planes) { return impl_->WriteRows(planes); }
 Status BandWriter::Write(std::span<const Image<uint8_t>> planes) {

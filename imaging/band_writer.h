@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <span>
 
 #include "core/error.h"
@@ -20,10 +21,12 @@ namespace sateen {
 /// Errors  kIo: cannot be encoded or written; what is there then counts for nothing
 class BandWriter {
  public:
-  // `channels` 1 or 3, of T: float for EXR, uint8_t or uint16_t for PNG.
+  // Opens a file of 1 or 3 channels of T: float for EXR, uint8_t or uint16_t for PNG. A PNG tells
+  // `pixel_mm`, the size of a pixel, in its pHYs chunk, as whole pixels per metre.
   template <typename T>
   [[nodiscard]] static Result<BandWriter> Open(const std::filesystem::path& path, ImageSize size,
-                                               size_t channels);
+                                               size_t channels,
+                                               std::optional<double> pixel_mm = std::nullopt);
   BandWriter(BandWriter&& other) noexcept;
   BandWriter& operator=(BandWriter&& other) noexcept;
   BandWriter(const BandWriter&) = delete;

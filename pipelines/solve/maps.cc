@@ -68,11 +68,13 @@ Result<MapsWriter> MapsWriter::Begin(ImageSize size_px, const MapsFacts& facts, 
   MapsWriter writer(size_px, facts.normal_y);
   Status status;
   const auto open = [&]<typename T>(T /*kind*/, const char* name, size_t channels, bool is_wanted,
-                                    std::optional<BandWriter>& file) {
+                                    std::optional<BandWriter>& file,
+                                    std::optional<double> pixel_mm = std::nullopt) {
     if (!is_wanted) {
       folder.Retire(name);
     } else if (status) {
-      Result<BandWriter> opened = BandWriter::Open<T>(folder.Stage(name), size_px, channels);
+      Result<BandWriter> opened =
+          BandWriter::Open<T>(folder.Stage(name), size_px, channels, pixel_mm);
       status = opened ? Status() : tl::unexpected(opened.error());
       if (opened) {
         file.emplace(*std::move(opened));
@@ -80,7 +82,7 @@ Result<MapsWriter> MapsWriter::Begin(ImageSize size_px, const MapsFacts& facts, 
     }
   };
   open(float(), "normal.exr", 3, true, writer.normal_);
-  open(uint16_t(), "normal.png", 3, true, writer.normal_png_);
+  open(uint16_t(), "normal.png", 3, true, writer.normal_png_, facts.pixel_mm);
   open(float(), "albedo.exr", 3, true, writer.albedo_);
   open(float(), "residual.exr", 1, true, writer.residual_);
   open(uint8_t(), "samples.png", 1, true, writer.samples_);

@@ -26,6 +26,8 @@ struct MapsFacts {
   bool has_ladder = false;
   // Camera whose pixels the maps have; absent where the rig has none.
   std::optional<Camera> camera;
+  // Side of a pixel on the surface, at the middle of the maps; absent without a camera.
+  std::optional<double> pixel_mm;
 };
 
 // Returns the facts of a solve with `rig`, whose table plane is the surface: lifted by

@@ -101,6 +101,9 @@ void AddOptional(const SolveOptions& options, const SolveOutcome& outcome, nlohm
                         {"turned_deg", ToJson(relief->turned_deg)},
                         {"seconds", relief->seconds}};
   }
+  if (outcome.maps.pixel_mm) {
+    report["pixel_mm"] = *outcome.maps.pixel_mm;
+  }
   if (options.undistort) {
     const Camera& camera = *outcome.maps.camera;
     report["map_camera"] = {{"k", {camera.fx, camera.fy, camera.cx, camera.cy}},
