@@ -24,9 +24,7 @@ Result<PageFormat> FormatOf(const fs::path& output) {
   if (extension == ".png") {
     return PageFormat::kPng;
   }
-  return Fail(ErrorCode::kInvalidArgument,
-              "{}: is a file of no kind that can be written; need "
-              ".pdf, .svg or .png",
+  return Fail(ErrorCode::kInvalidArgument, "{}: unsupported file type; need .pdf, .svg or .png",
               output.string());
 }
 
@@ -75,16 +73,16 @@ std::string JsonReport(const BoardPrintArgs& args, const Page& page) {
 
 void AddBoardPrint(CLI::App& board, BoardPrintArgs& args) {
   CLI::App* print = board.add_subcommand(
-      "print", "Draw a board, or a sheet with a marker border, to be printed in its size");
+      "print", "Draw a board, or a sheet with a marker border, to be printed at its true size");
   print
       ->add_option("target", args.spec,
                    "chessboard:9x6:24mm (inner corners, square), charuco:10x7:25mm:18mm (squares, "
                    "square, marker) or sheet:A4:12mm (paper, marker)")
       ->required();
   print->add_option("--paper", args.paper,
-                    "A4, A3, A2, letter or WIDTHxHEIGHTmm; default A4, of a sheet its own");
+                    "A4, A3, A2, letter or WIDTHxHEIGHTmm; default: A4, or the sheet's own");
   print->add_option("-o,--output", args.output, "File to write: .pdf, .svg or .png")->required();
-  print->add_option("--dpi", args.dpi, "Pixels an inch of a PNG")
+  print->add_option("--dpi", args.dpi, "Resolution of a PNG in pixels per inch")
       ->check(CLI::Range(50.0, 1200.0))
       ->capture_default_str();
   print->add_flag("--json", args.json, "Print one JSON object on stdout instead of the text");

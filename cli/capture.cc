@@ -106,24 +106,25 @@ int ReportCapture(const CaptureArgs& args, const CaptureRequest& request,
 void AddCapture(CLI::App& root, CaptureArgs& args) {
   CLI::App* cmd = root.add_subcommand(
       "capture",
-      "Capture a session: the dark, a frame under each light, the first light again, the dark "
-      "again; every frame checked");
+      "Capture a session: a dark frame, a frame under each light, the first light again, a second "
+      "dark frame; every frame is checked");
   CLI::Option* resume =
       cmd->add_option("--resume", args.resume,
-                      "Go on with this session after a crash, a power cut or Ctrl-C: frames that "
-                      "are there and whole are kept");
+                      "Continue this session after a crash, a power cut or Ctrl-C: complete frames "
+                      "are kept");
   CLI::Option* rig = cmd->add_option("--rig", args.request.rig, "Rig file")->excludes(resume);
   CLI::Option* output =
       cmd->add_option("-o,--output", args.request.output, "Folder for the session")
           ->excludes(resume);
   CaptureOptions& options = args.request.options;
-  cmd->add_flag("--sheet", args.sheet, "It is a sheet of white paper, to calibrate the lights by")
+  cmd->add_flag("--sheet", args.sheet,
+                "The object is a sheet of white paper for calibrating the lights")
       ->excludes(resume);
   cmd->add_option(
       "--exposure", args.exposure,
-      "Exposure of each frame, as 1/50 or 20ms; auto, the default: by test frames of the "
-      "brightest light, and several a light where one cannot hold the scene. With "
-      "--resume: every frame is taken again, at this one");
+      "Exposure of each frame, as 1/50 or 20ms. auto, the default: from test frames of the "
+      "brightest light, and several per light where one cannot cover the scene. With "
+      "--resume: take every frame again, at this exposure");
   cmd->add_option("--aperture", options.f_number, "f-number")
       ->capture_default_str()
       ->excludes(resume);
@@ -132,23 +133,24 @@ void AddCapture(CLI::App& root, CaptureArgs& args) {
       ->capture_default_str()
       ->excludes(resume);
   cmd->add_option("--brackets", options.brackets,
-                  "Exposures a light, at most, with --exposure auto; 1 to 3")
+                  "Most exposures per light with --exposure auto, 1 to 3")
       ->capture_default_str()
       ->excludes(resume);
   AddDeviceOptions(*cmd, args.devices);
-  cmd->add_option("--tries", options.tries, "How often a frame is tried before the capture stops")
+  cmd->add_option("--tries", options.tries, "Attempts per frame before the capture stops")
       ->capture_default_str();
-  cmd->add_option("--settle", args.settle, "From a light's going on to the exposure")
+  cmd->add_option("--settle", args.settle, "Time from turning a light on to the exposure")
       ->capture_default_str();
   cmd->add_option("--margin", args.margin,
-                  "How much longer than the exposure a light may be on, until the camera has "
-                  "delivered")
+                  "Time beyond the exposure for which a light may stay on, until the camera has "
+                  "delivered the frame")
       ->capture_default_str();
   cmd->add_option("--deadline", args.deadline, "Longest wait for a frame beyond its exposure")
       ->capture_default_str();
-  cmd->add_flag("--dry-run", args.dry_run,
-                "Look whether the capture could begin, and say what it would do; no frame is "
-                "taken, no file written")
+  cmd->add_flag(
+         "--dry-run", args.dry_run,
+         "Check whether the capture can begin and report what it would do; takes no frame and "
+         "writes no file")
       ->excludes(resume);
   cmd->add_flag("--json", args.json, "Print JSON");
   cmd->final_callback([&args, rig, output] {

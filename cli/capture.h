@@ -13,10 +13,10 @@ namespace sateen::cli {
 
 struct CaptureArgs {
   CaptureRequest request;
-  std::filesystem::path resume;  // the session to go on with; empty: a new one
+  std::filesystem::path resume;  // session to continue; empty: a new one
   RigDeviceNames devices;
   bool sheet = false;
-  std::string exposure;  // empty: auto, or on resuming as before
+  std::string exposure;  // empty: auto, or with resume as before
   std::string level = "100%";
   std::string settle = "30ms";
   std::string margin = "6s";
@@ -27,17 +27,17 @@ struct CaptureArgs {
 
 void AddCapture(CLI::App& root, CaptureArgs& args);
 
-// Asks the daemon where one is running and args name no device, else opens board and camera. Returns
-// the exit status.
+// Asks the daemon where one is running and args name no device; else opens board and camera.
+// Returns the exit status.
 int RunCaptureCommand(const CaptureArgs& args, const Task& task, std::ostream& out,
                       std::ostream& log);
-// The same on devices that a test gives, and by a daemon.
+// Run the same on given devices, and by a daemon.
 int RunCaptureWith(const CaptureArgs& args, RigDevices& devices, const Task& task,
                    std::ostream& out, std::ostream& log);
 int RunCaptureByDaemon(const CaptureArgs& args, const DaemonClient& daemon, const Task& task,
                        std::ostream& out, std::ostream& log);
 
-// What a capture and a dry run report, as text and as JSON (docs/formats.md).
+// Report a capture and a dry run, as text and as JSON (docs/formats.md).
 [[nodiscard]] std::string CaptureText(const std::filesystem::path& session, const Rig& rig,
                                       const CaptureSummary& summary);
 [[nodiscard]] std::string CaptureJson(const std::filesystem::path& session, const Rig& rig,

@@ -8,7 +8,7 @@
 namespace sateen::cli {
 namespace {
 
-// Of the lit frames, ascending.
+// Returns the exposures of the lit frames, ascending.
 std::vector<double> ExposuresOf(const std::vector<SessionFrame>& frames) {
   std::set<double> exposures_s;
   for (const SessionFrame& frame : frames) {
@@ -53,15 +53,15 @@ std::string CaptureText(const std::filesystem::path& session, const Rig& rig,
   }
   text += fmt::format("\nexposure {}, f/{:g}, ISO {:g}\n", ExposuresText(ExposuresOf(frames)),
                       frames[0].f_number.value_or(0.0), frames[0].iso.value_or(0.0));
-  text += "lights, of what the rig says against the others:";
+  text += "brightness relative to the calibration:";
   for (std::size_t k = 0; k < check.levels.size(); ++k) {
     text += fmt::format("{} {} {:.1f} %", k == 0 ? "" : ",", rig.lights[k].name,
                         100.0 * check.levels[k]);
   }
-  text += fmt::format("\nfrom start to end: '{}' {:+.2f} %, ambient light {:+.3f} %",
+  text += fmt::format("\nchange from start to end: '{}' {:+.2f} %; ambient light {:+.3f} %",
                       rig.lights[0].name, 100.0 * check.drift, 100.0 * check.ambient);
   if (!check.shifts.empty()) {
-    text += fmt::format(", picture moved by {:.2f} px at most", LargestShift(check));
+    text += fmt::format(", largest shift of the picture {:.2f} px", LargestShift(check));
   }
   text += '\n';
   for (const std::string& note : check.notes) {
@@ -101,16 +101,16 @@ std::string CaptureJson(const std::filesystem::path& session, const Rig& rig,
 std::string ForecastText(const CaptureForecast& forecast) {
   const CaptureOptions& options = forecast.request.options;
   return fmt::format(
-      "could capture {} frames into {}: nothing is in the way\n"
+      "ready to capture {} frames into {}\n"
       "board   {}, firmware {}\n"
       "camera  {} at {}, profile {}\n"
       "exposure {}, f/{:g}, ISO {:g}, lights at {}\n"
-      "about {:.0f} MB a series of exposures; {:.0f} MB are free\n",
+      "about {:.0f} MB per series of exposures; {:.0f} MB are free\n",
       forecast.plan.size(), forecast.request.output.string(), forecast.port, forecast.firmware,
       forecast.camera.model, forecast.camera.port, forecast.camera.profile,
       forecast.exposure_known
           ? ExposureText(forecast.settings.exposure_s)
-          : fmt::format("to be found, up to {} a light",
+          : fmt::format("from test frames, up to {} per light",
                         options.kind == SessionKind::kSheet ? 1 : options.brackets),
       forecast.settings.f_number, forecast.settings.iso, LevelText(options.level),
       Megabytes(forecast.bytes), Megabytes(forecast.free_bytes));

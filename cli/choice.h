@@ -1,6 +1,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -9,10 +10,10 @@
 
 namespace sateen::cli {
 
-// Adds an option whose text is one of `names`. `take` gets the index of the name that was typed;
-// help shows names[initial] as the default.
+// Adds an option whose text is one of `names`. `take` gets the index of the name that was typed.
+// Help shows names[initial] as the default, if there is one.
 void AddNamedChoice(CLI::App& cmd, const std::string& flag, const std::string& help,
-                    std::vector<std::string> names, size_t initial,
+                    std::vector<std::string> names, std::optional<size_t> initial,
                     std::function<void(size_t)> take);
 
 // Adds an option for a value of an enumeration, which is typed as Name(value). The default is what
@@ -21,7 +22,7 @@ template <typename Value>
 void AddChoice(CLI::App& cmd, const std::string& flag, const std::string& help,
                const std::vector<Value>& choices, Value& value) {
   std::vector<std::string> names;
-  size_t initial = 0;
+  std::optional<size_t> initial;
   for (size_t k = 0; k < choices.size(); ++k) {
     names.emplace_back(Name(choices[k]));
     initial = choices[k] == value ? k : initial;

@@ -23,7 +23,7 @@ void AskPort(DeviceReply& device, std::unique_ptr<BytePort> port) {
   TakeBoard(device, board.Info());
 }
 
-// What a capture would meet.
+// Connects to a camera as a capture does.
 DeviceReply ConnectCamera(const UsbCamera& found) {
   DeviceReply device = ReplyOf(found);
   if (!device.what.empty()) {
@@ -47,8 +47,8 @@ void PrintDevices(const std::vector<DeviceReply>& devices, std::ostream& out) {
   }
   if (std::ranges::none_of(devices, &DeviceReply::is_camera)) {
     out << fmt::format("{:<24} {}\n", "no camera",
-                       "none on USB: switch it on, use a cable with data lines; one on the "
-                       "network: --camera ptpip:ADDRESS");
+                       "none on USB: switch it on, use a cable with data lines; for one on the "
+                       "network add --camera ptpip:ADDRESS");
   }
 }
 
@@ -71,10 +71,10 @@ int ReportDevices(const DevicesArgs& args, const std::vector<DeviceReply>& devic
   const auto ports = std::ranges::count(devices, false, &DeviceReply::is_camera);
   return DevicesFailed(
       {ErrorCode::kDevice,
-       asked ? "no LED board answered; mend what is said of each port above, or upload "
+       asked ? "no LED board answered; fix what is reported for each port above, or upload "
                "the firmware (make flash)"
-             : fmt::format("no LED board among {} serial port{}; plug it in, or name its "
-                           "port with --port",
+             : fmt::format("no LED board among {} serial port{}; plug it in, or give its "
+                           "port by --port",
                            ports, ports == 1 ? "" : "s")},
       log);
 }
@@ -91,10 +91,9 @@ int RunDevicesByDaemon(const DevicesArgs& args, const DaemonClient& daemon, std:
 void AddDevices(CLI::App& root, DevicesArgs& args) {
   CLI::App* cmd = root.add_subcommand(
       "devices",
-      "List the serial ports and ask those that may be an LED board what they are, which turns "
-      "their lights off; list the cameras, connect to each, and say what is missing and how to "
-      "mend it");
-  cmd->add_option("--port", args.port, "Ask this port too, whatever its USB id")
+      "List serial ports and cameras. Connects to each port that may be an LED board, which turns "
+      "its lights off, and to each camera; reports what is missing and how to fix it");
+  cmd->add_option("--port", args.port, "Connect to this port too, whatever its USB id")
       ->envname("SATEEN_PORT");
   cmd->add_option("--camera", args.camera,
                   "Connect to this camera too: ptpip:ADDRESS, usb:BUS,DEVICE or folder:DIR")
@@ -127,7 +126,7 @@ int RunDevicesAmong(const DevicesArgs& args, std::vector<SerialPortInfo> ports,
   if (!args.port.empty()) {
     auto named = std::ranges::find(ports, args.port, &SerialPortInfo::name);
     if (named == ports.end()) {
-      named = ports.insert(named, {.name = args.port, .description = "named with --port"});
+      named = ports.insert(named, {.name = args.port, .description = "given by --port"});
     }
     named->may_be_board = true;
   }
@@ -146,7 +145,7 @@ int RunDevicesAmong(const DevicesArgs& args, std::vector<SerialPortInfo> ports,
   }
   if (!args.camera.empty() &&
       std::ranges::find(cameras, args.camera, &UsbCamera::port) == cameras.end()) {
-    devices.push_back(ConnectCamera({.port = args.camera, .description = "named with --camera"}));
+    devices.push_back(ConnectCamera({.port = args.camera, .description = "given by --camera"}));
   }
   return ReportDevices(args, devices, std::ranges::any_of(ports, &SerialPortInfo::may_be_board),
                        out, log);

@@ -14,8 +14,8 @@
 namespace sateen::cli {
 
 struct DevicesArgs {
-  std::string port;    // asked too, whatever its USB id
-  std::string camera;  // connected to, whatever is on USB
+  std::string port;    // connected to, whatever its USB id; empty: none
+  std::string camera;  // connected to, whatever is on USB; empty: none
   bool json = false;
 };
 
@@ -24,7 +24,7 @@ void AddDevices(CLI::App& root, DevicesArgs& args);
 // Returns the exit status: 5 where no board answered. Asks the daemon where one is running and args
 // name no device of their own.
 int RunDevices(const DevicesArgs& args, const Task& task, std::ostream& out, std::ostream& log);
-// The same over ports and cameras that a test gives; those without an obstacle are connected to.
+// Runs the same over given ports and cameras. Connects to those without an obstacle.
 int RunDevicesAmong(const DevicesArgs& args, std::vector<SerialPortInfo> ports,
                     const std::function<std::unique_ptr<BytePort>(const std::string&)>& open,
                     const Task& task, std::ostream& out, std::ostream& log,

@@ -7,6 +7,7 @@
 #include <ostream>
 #include <utility>
 
+#include "cli/choice.h"
 #include "cli/light_report.h"
 #include "core/quantity.h"
 #include "rig/rig.h"
@@ -27,7 +28,7 @@ std::optional<int> Number(const std::string& text) {
                                                                    : std::nullopt;
 }
 
-// A name of the rig's comes before a number.
+// Finds the channel of a light. A name of the rig comes before a number.
 Result<int> FindChannel(const std::string& text, const std::filesystem::path& rig_file) {
   if (!rig_file.empty()) {
     const Result<Rig> rig = ReadRig(rig_file);
@@ -44,12 +45,12 @@ Result<int> FindChannel(const std::string& text, const std::filesystem::path& ri
   }
   return rig_file.empty()
              ? Fail(ErrorCode::kInvalidArgument,
-                    "'{}' is no number of a light; names are looked up in a rig: --rig rig.json",
+                    "'{}' is not the number of a light; for a light's name add --rig rig.json",
                     text)
              : Fail(ErrorCode::kInvalidArgument, "{} has no light '{}'", rig_file.string(), text);
 }
 
-// The channel that the command line names, if it names one.
+// Finds the channel that the command line names, if it names one.
 Result<std::optional<int>> NamedChannel(const LightArgs& args) {
   const bool limits = args.what == "limits";
   if (limits ? args.target.empty() : args.what == "status" || args.what == "off") {
@@ -59,7 +60,7 @@ Result<std::optional<int>> NamedChannel(const LightArgs& args) {
   return channel ? Result<std::optional<int>>(*channel) : tl::unexpected(channel.error());
 }
 
-// The rig, over its own port or by the daemon.
+// The means of driving the board: over its port, or by the daemon.
 struct LightRig {
   std::function<Result<BoardWord>(const BoardChange&)> change;
   std::function<Status()> all_off;
@@ -111,14 +112,8 @@ Result<BoardChange> ChangeOf(const LightArgs& args, std::optional<int> channel) 
   if (args.max_lit != 0) {
     change.max_lit = args.max_lit;
   }
-  for (int dim_clock = 0; dim_clock < 3; ++dim_clock) {
-    if (args.dim == DimClockText(dim_clock)) {
-      change.dim_clock = dim_clock;
-    }
-  }
-  if (!args.sync.empty()) {
-    change.sync_rising = args.sync == "rising";
-  }
+  change.dim_clock = args.dim_clock;
+  change.sync_rising = args.sync_rising;
   return change;
 }
 
@@ -168,35 +163,38 @@ int LightEnded(const Status& done, std::ostream& log) {
 
 void AddLight(CLI::App& root, LightArgs& args) {
   CLI::App* cmd = root.add_subcommand(
-      "light", "Turn a light of the LED board on or off, show its state, set its limits");
-  cmd->add_option("light", args.what,
-                  "Number or name of a light: turns it on until Ctrl-C, the time of --for or its "
-                  "limit; 'off': all lights; 'status'; 'limits'")
+      "light", "Turn a light of the LED board on or off, show the board's state, set its limits");
+  cmd->add_option(
+         "light", args.what,
+         "Number or name of a light, which turns it on until Ctrl-C, the time of --for or its "
+         "limit; 'off' for all lights; 'status'; or 'limits'")
       ->required();
-  cmd->add_option("target", args.target, "Of limits: number or name of a light; default: all");
+  cmd->add_option("target", args.target, "With limits: number or name of a light; default: all");
   cmd->add_option("--level", args.level, "Level of the light, 0% (off), 0.1% to 100%")
       ->capture_default_str();
   cmd->add_option("--for", args.on_time, "Turn the light off after this long, as 500ms or 2s");
-  cmd->add_option("--rig", args.rig, "Rig file in which names of lights are looked up");
+  cmd->add_option("--rig", args.rig, "Rig file with the names of the lights");
   cmd->add_option("--port", args.port,
                   "Serial port of the LED board, as /dev/ttyACM0; default: the one whose USB id is "
                   "an Arduino's")
       ->envname("SATEEN_PORT");
   cmd->add_flag("--clear-fault", args.clear_fault,
-                "Of status: acknowledge the fault that it shows");
-  cmd->add_flag("--json", args.json, "Of status: print JSON");
-  cmd->add_option("--max-level", args.max_level, "Of limits: highest level, as 80%");
-  cmd->add_option("--max-on", args.max_on, "Of limits: longest time on, 1ms to 60s");
-  cmd->add_option("--max-lit", args.max_lit, "Of limits: lights that may be on together")
+                "With status: acknowledge the fault that it shows");
+  cmd->add_flag("--json", args.json, "With status: print JSON");
+  cmd->add_option("--max-level", args.max_level, "With limits: highest level, as 80%");
+  cmd->add_option("--max-on", args.max_on, "With limits: longest time on, 1ms to 60s");
+  cmd->add_option("--max-lit", args.max_lit, "With limits: most lights that may be on together")
       ->check(CLI::Range(1, 16));
-  cmd->add_option("--dim", args.dim, "Of limits: frequency of the dimming line")
-      ->check(CLI::IsMember({"16kHz", "2kHz", "250Hz"}));
-  cmd->add_option("--sync", args.sync, "Of limits: edge of the flash sync that fires a light")
-      ->check(CLI::IsMember({"falling", "rising"}));
+  AddNamedChoice(*cmd, "--dim", "With limits: frequency of the dimming line",
+                 {DimClockText(0), DimClockText(1), DimClockText(2)}, std::nullopt,
+                 [&args](size_t k) { args.dim_clock = static_cast<int>(k); });
+  AddNamedChoice(*cmd, "--sync", "With limits: edge of the flash sync that fires a light",
+                 {"falling", "rising"}, std::nullopt,
+                 [&args](size_t k) { args.sync_rising = k == 1; });
   cmd->final_callback([&args] {
     const bool limits = args.what == "limits";
     if (!limits && (!args.target.empty() || !args.max_level.empty() || !args.max_on.empty() ||
-                    args.max_lit != 0 || !args.dim.empty() || !args.sync.empty())) {
+                    args.max_lit != 0 || args.dim_clock || args.sync_rising)) {
       throw CLI::ValidationError(
           "a second light, --max-level, --max-on, --max-lit, --dim and --sync go with 'limits'");
     }

@@ -14,26 +14,26 @@
 namespace sateen::cli {
 
 struct LightArgs {
-  std::string what;           // a channel, a light's name, "off", "status" or "limits"
-  std::string target;         // of limits: a channel or a name; empty: all
+  std::string what;           // channel, light's name, "off", "status" or "limits"
+  std::string target;         // channel or name whose limits are meant; empty: all
   std::string port;           // empty: the one that looks like the LED board
-  std::filesystem::path rig;  // where names are looked up
+  std::filesystem::path rig;  // holds the lights' names
   std::string level = "50%";
   std::string on_time;  // empty: until Ctrl-C, or the light's limit
   bool clear_fault = false;
   bool json = false;
-  // Of limits; empty: as it is.
+  // Limits to set; empty, 0 or absent: unchanged.
   std::string max_level;
   std::string max_on;
-  int max_lit = 0;   // 0: as it is
-  std::string dim;   // "16kHz", "2kHz", "250Hz"
-  std::string sync;  // "falling", "rising"
+  int max_lit = 0;
+  std::optional<int> dim_clock;  // 0: 16 kHz, 1: 2 kHz, 2: 250 Hz
+  std::optional<bool> sync_rising;
 };
 
 void AddLight(CLI::App& root, LightArgs& args);
 
-// Returns the exit status. The first asks the daemon where one is running and args name no port, else
-// it opens a port; tests give theirs.
+// Return the exit status. The first asks the daemon where one is running and args name no port;
+// else it opens a port.
 int RunLight(const LightArgs& args, const Task& task, std::ostream& out, std::ostream& log);
 int RunLightByDaemon(const LightArgs& args, const DaemonClient& daemon, const Task& task,
                      std::ostream& out, std::ostream& log);

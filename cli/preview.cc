@@ -4,8 +4,8 @@
 #include <ostream>
 
 #include "cli/device_options.h"
-#include "core/quantity.h"
 #include "core/output_folder.h"
+#include "core/quantity.h"
 
 namespace sateen::cli {
 namespace {
@@ -38,7 +38,7 @@ int ReportPreview(const PreviewArgs& args, const Result<Preview>& preview, std::
     log << "sateen preview: error: " << preview.error().message << '\n';
     return ExitStatus(preview.error());
   }
-  out << fmt::format("{}: {}x{} px, {}, f/{:g}, ISO {:g}; peak at {:.0f} % of what saturates\n",
+  out << fmt::format("{}: {}x{} px, {}, f/{:g}, ISO {:g}; peak at {:.0f} % of saturation\n",
                      args.output.string(), preview->size_px.width, preview->size_px.height,
                      ExposureText(preview->settings.exposure_s), preview->settings.f_number,
                      preview->settings.iso, 100.0 * preview->levels.peak);
@@ -48,19 +48,20 @@ int ReportPreview(const PreviewArgs& args, const Result<Preview>& preview, std::
 }  // namespace
 
 void AddPreview(CLI::App& root, PreviewArgs& args) {
-  CLI::App* cmd = root.add_subcommand(
-      "preview",
-      "Take one frame and write it as a JPEG to look at: framing, focus, exposure; magenta where "
-      "it saturates");
+  CLI::App* cmd = root.add_subcommand("preview",
+                                      "Take one frame and write it as a JPEG to check framing, "
+                                      "focus and exposure; saturated pixels "
+                                      "are magenta");
   PreviewRequest& request = args.request;
-  cmd->add_option("-o,--output", args.output,
-                  "JPEG file, .jpg or .jpeg: half the sensor's size, or less where that is wider "
-                  "than --max-width")
+  cmd->add_option(
+         "-o,--output", args.output,
+         "JPEG file, .jpg or .jpeg, of half the sensor's size, or smaller where that is wider "
+         "than --max-width")
       ->capture_default_str();
   cmd->add_option("--light", args.light,
                   "Name (of --rig) or channel of the light that is on; default: room light alone");
   cmd->add_option("--rig", request.rig, "Rig file: names of lights, white balance");
-  cmd->add_option("--exposure", args.exposure, "Exposure, as 1/50 or 20ms; auto: by test frames")
+  cmd->add_option("--exposure", args.exposure, "Exposure, as 1/50 or 20ms; auto: from test frames")
       ->capture_default_str();
   cmd->add_option("--aperture", request.f_number, "f-number")->capture_default_str();
   cmd->add_option("--iso", request.iso, "ISO")->capture_default_str();

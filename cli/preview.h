@@ -23,7 +23,7 @@ void AddPreview(CLI::App& root, PreviewArgs& args);
 
 // Asks the daemon where one is running and args name no device. Returns the exit status.
 int RunPreview(const PreviewArgs& args, const Task& task, std::ostream& out, std::ostream& log);
-// The same on devices that a test gives.
+// Runs the same on given devices.
 int RunPreviewWith(const PreviewArgs& args, RigDevices& devices, const Task& task,
                    std::ostream& out, std::ostream& log);
 

@@ -55,7 +55,7 @@ CommandTable AddCommands(CLI::App& app) {
   table.Add(app, AddLight, RunLight);
   table.Add(app, AddDevices, RunDevices);
   table.Add(app, AddServe, RunServe);
-  CLI::App& session = AddGroup(app, "session", "Look after sessions on disk");
+  CLI::App& session = AddGroup(app, "session", "Verify and show sessions on disk");
   table.Add(session, AddSessionVerify, RunSessionVerify);
   table.Add(session, AddSessionOverview, RunSessionOverview);
   CLI::App& bench = AddGroup(app, "bench", "Measure speed against error on this machine");

@@ -18,7 +18,7 @@
 namespace sateen::cli {
 namespace {
 
-// How soon a signal is heard.
+// Longest delay until a signal is noticed.
 constexpr std::chrono::milliseconds kSignalStep{50};
 
 struct Door {
@@ -26,7 +26,7 @@ struct Door {
   std::optional<AccessRules> access;
 };
 
-// Every door, or none: what is asked for and cannot be had is an error before the rig is touched.
+// Opens every listener that is asked for, or fails before the rig is touched.
 Result<std::vector<Door>> OpenDoors(const ServeArgs& args) {
   std::vector<Door> doors;
   std::string token;
@@ -64,18 +64,19 @@ Result<std::vector<Door>> OpenDoors(const ServeArgs& args) {
 void AddServe(CLI::App& root, ServeArgs& args) {
   CLI::App* cmd = root.add_subcommand(
       "serve",
-      "Own the LED board and the camera, and do what programs ask over a socket (docs/api.md); the "
-      "other commands use it. Ends on Ctrl-C or SIGTERM, with all lights off");
-  cmd->add_option("--socket", args.socket,
-                  "Unix socket; default: $XDG_RUNTIME_DIR/sateen.sock, without that folder "
-                  "/run/sateen/sateen.sock")
+      "Run the daemon, which owns the LED board and the camera and serves programs over a socket "
+      "(docs/api.md); other commands use it. Ends on Ctrl-C or SIGTERM, with all lights off");
+  cmd->add_option(
+         "--socket", args.socket,
+         "Unix socket; default: $XDG_RUNTIME_DIR/sateen.sock, or /run/sateen/sateen.sock without "
+         "that folder")
       ->envname("SATEEN_SOCKET");
   CLI::Option* listen =
       cmd->add_option("--listen", args.listen,
-                      "Listen on TCP too, 127.0.0.1:PORT or [::1]:PORT; port 0: a free one");
-  CLI::Option* token = cmd->add_option(
-      "--token-file", args.token_file,
-      "File of mode 0600 whose first line clients on TCP must send as bearer token");
+                      "Also listen on TCP, at 127.0.0.1:PORT or [::1]:PORT; port 0: any free port");
+  CLI::Option* token =
+      cmd->add_option("--token-file", args.token_file,
+                      "File of mode 0600; TCP clients must send its first line as bearer token");
   listen->needs(token);
   token->needs(listen);
   cmd->add_option("--port", args.devices.port,

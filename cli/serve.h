@@ -21,8 +21,8 @@ struct ServeArgs {
 
 void AddServe(CLI::App& root, ServeArgs& args);
 
-// Serves until the task is cancelled, which is how a daemon ends: exit status 0. The first opens the
-// devices that args name; tests give others, and what a capture's request leaves open.
+// Serve until the task is cancelled, which is how a daemon ends: exit status 0. The first opens the
+// devices that args name. `capture` holds what a capture's request leaves open.
 int RunServe(const ServeArgs& args, const Task& task, std::ostream& out, std::ostream& log);
 int RunServeOn(const ServeArgs& args, std::unique_ptr<RigDevices> devices,
                const CaptureOptions& capture, const Task& task, std::ostream& out,

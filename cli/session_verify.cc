@@ -11,8 +11,8 @@ namespace sateen::cli {
 void AddSessionVerify(CLI::App& session, SessionVerifyArgs& args) {
   CLI::App* cmd = session.add_subcommand(
       "verify",
-      "Prove a session whole: its record, its journal and its rig agree, every light has its frame "
-      "and every file its hash; exit status 3 where not, with all that is wrong");
+      "Verify a session: record, journal and rig agree, every light has its frame, every file has "
+      "its hash. Exit status 3 with a list of faults if not");
   cmd->add_option("session", args.session, "Folder of the session")->required();
   cmd->add_flag("--json", args.json, "Print JSON");
 }

@@ -307,7 +307,7 @@ Status WriteFiles(const BenchAccuracyArgs& args, const AccuracyReport& report) {
 void AddBenchAccuracy(CLI::App& bench, BenchAccuracyArgs& args) {
   CLI::App* cmd = bench.add_subcommand(
       "accuracy",
-      "Every method on every data set that is there: time, error against truth, and whether the "
+      "Run every method on every data set found: time, error against truth, and whether the "
       "predicted uncertainty holds; beside plain re-implementations of others' methods");
   cmd->add_option("--data", args.data, "Folder with the public data sets bunny and diligent-ball")
       ->check(CLI::ExistingDirectory)

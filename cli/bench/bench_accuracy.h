@@ -21,19 +21,19 @@ struct BenchAccuracyArgs {
   bool json = false;
 };
 
-// A method on a data set.
+// Result of a method on a data set.
 struct AccuracyRow {
   std::string data;
   std::string method;
-  ErrorStatistics angular_error_deg;  // of solved pixels
+  ErrorStatistics angular_error_deg;  // over solved pixels
   int64_t pixels = 0;                 // inside the mask
   double ns_per_pixel = 0.0;          // on one thread
   double megapixels_per_s = 0.0;      // on all threads; 0: the method has one
-  // Of a ladder: root mean square of error over uncertainty, and share of errors inside the interval
-  // that should hold 95 of 100; 0 without one.
+  // Root mean square of error over uncertainty, and share of errors inside the 95 % interval; 0 for
+  // methods without uncertainty.
   double standardised_error = 0.0;
   double coverage = 0.0;
-  // Mean relative error of the colours of albedo, and of a ladder the same two of its uncertainty; 0 where
+  // Mean relative error of the albedo's colours, and the same two figures of its uncertainty; 0 where
   // no truth is known.
   double albedo_error = 0.0;
   double albedo_standardised_error = 0.0;
@@ -54,9 +54,9 @@ int RunBenchAccuracy(const BenchAccuracyArgs& args, const Task& task, std::ostre
 // Schema sateen.bench.accuracy/1 (docs/formats.md).
 [[nodiscard]] std::string JsonReport(const AccuracyReport& report);
 [[nodiscard]] std::string TextReport(const AccuracyReport& report);
-// The page docs/accuracy.md; `plot` is its picture's place, relative to it, or empty.
+// Returns the page docs/accuracy.md; `plot` is the path of its picture relative to it, or empty.
 [[nodiscard]] std::string MarkdownReport(const AccuracyReport& report, const std::string& plot);
-// A panel for each data set: time a pixel against mean error; lower left is better.
+// Plots time per pixel against mean error, a panel per data set; lower left is better.
 [[nodiscard]] std::string SvgPlot(const AccuracyReport& report);
 
 }  // namespace sateen::cli

@@ -39,7 +39,7 @@ std::string ColorOfMethod(const std::string& method) {
                                                : "#777777";
 }
 
-// What stands beside a dot.
+// Returns the label of a dot.
 struct Label {
   double dot_x = 0.0;
   double dot_y = 0.0;

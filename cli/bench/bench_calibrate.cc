@@ -131,7 +131,7 @@ class CalibrateBench {
     return WriteFileWhole(Path("ruler.json"), RigToJson(*ruler));
   }
 
-  // What no calibration from these files can go below: LibRaw's decoding.
+  // Measures LibRaw's decoding alone, which no calibration from these files can beat.
   Status MeasureRaw() {
     std::vector<fs::path> files;
     for (int sheet = 0; sheet <= kTilts; ++sheet) {
@@ -236,7 +236,7 @@ void AddBenchCalibrate(CLI::App& bench, BenchCalibrateArgs& args) {
   cmd->add_option("--height", args.height, "Height of the frames [px]")
       ->check(CLI::Range(256, 20000))
       ->capture_default_str();
-  cmd->add_option("--rigs", args.rigs, "Random rigs on which predicted errors are tried")
+  cmd->add_option("--rigs", args.rigs, "Random rigs on which predicted errors are tested")
       ->check(CLI::Range(10, 100000))
       ->capture_default_str();
   cmd->add_option("--threads", args.threads, "Threads; 0: one for each core")

@@ -22,7 +22,7 @@ struct BenchCalibrateArgs {
   bool json = false;
 };
 
-// `sateen calibrate lights` on one set of sheets; errors against truth, the worst of the lights.
+// Errors of `sateen calibrate lights` on one set of sheets, the worst of the lights.
 struct CalibrateRow {
   std::string sheets;
   double position_mm = 0.0;
@@ -33,7 +33,7 @@ struct CalibrateRow {
   double peak_memory_gb = 0.0;
 };
 
-// A fabric solved with the lights of one calibration.
+// Errors of a fabric solved with the lights of one calibration.
 struct FabricRow {
   std::string lights;
   double low_frequency_deg = 0.0;  // the worst below 1 cycle per 50 mm

@@ -9,7 +9,8 @@ namespace sateen::cli {
 // Schema sateen.bench.solve/1 (docs/formats.md).
 [[nodiscard]] std::string JsonReport(const BenchReport& report);
 [[nodiscard]] std::string TextReport(const BenchReport& report);
-// Time a pixel against mean angular error, both logarithmic, all threads; lower left is better.
+// Plots time per pixel against mean angular error, both logarithmic, on all threads; lower left is
+// better.
 [[nodiscard]] std::string SvgPlot(const BenchReport& report);
 
 }  // namespace sateen::cli

@@ -85,7 +85,7 @@ class SimulateBench {
  private:
   [[nodiscard]] Task Quiet() const { return {.threads = task_.threads, .cancel = task_.cancel}; }
 
-  // What `sateen simulate` does for a RAW session, step by step.
+  // Does the work of `sateen simulate` for a RAW session, step by step.
   Status MeasureSession() {
     const ScratchFolder scratch("bench-simulate");
     Result<Scene> scene = scratch.Create().and_then([&] { return PlainScene(report_.size); });

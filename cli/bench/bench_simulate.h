@@ -24,13 +24,13 @@ struct BenchSimulateArgs {
 struct SimulateStage {
   std::string name;
   double seconds = 0.0;
-  double ns_per_pixel = 0.0;  // and frame
+  double ns_per_pixel = 0.0;  // per pixel and frame
 };
 
-// A scene with one effect more than the first.
+// Cost and effect of one switch in a scene that has nothing else.
 struct SimulateSwitch {
   std::string name;
-  double ns_per_pixel = 0.0;  // and frame, where every pixel looks included
+  double ns_per_pixel = 0.0;  // per pixel and frame, with all that every pixel looks at
   double times_plain = 0.0;
   ErrorStatistics angular_error_deg;  // of the solver's defaults on these frames
 };

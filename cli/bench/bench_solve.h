@@ -21,14 +21,14 @@ struct BenchSolveArgs {
   bool json = false;
 };
 
-// One backend on one case with one number of threads.
+// Result of one backend on one case with one number of threads.
 struct BenchRow {
   Backend backend = Backend::kAuto;
   std::string case_name;
   int threads = 0;
   double ns_per_pixel = 0.0;
-  double times_jacobi_svd = 0.0;  // how many times as fast, on as many threads
-  double times_floor = 0.0;       // how many times as slow, on as many threads
+  double times_jacobi_svd = 0.0;  // speed over that of jacobi-svd on as many threads
+  double times_floor = 0.0;       // time over that of the memory floor on as many threads
   double solved_fraction = 0.0;
   ErrorStatistics angular_error_deg;
   double albedo_error = 0.0;  // mean, relative

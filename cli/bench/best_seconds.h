@@ -6,7 +6,7 @@
 
 namespace sateen::cli {
 
-// Seconds of the fastest of `repeats` runs; the first error of one.
+// Returns the seconds of the fastest of `repeats` runs, or the first error.
 [[nodiscard]] Result<double> BestSeconds(int repeats, const std::function<Status()>& run);
 
 }  // namespace sateen::cli

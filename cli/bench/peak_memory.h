@@ -2,8 +2,8 @@
 
 namespace sateen::cli {
 
-// Most memory that the process has held since ResetPeakMemory(), or, where the system cannot do
-// that, since it began.
+// Returns the most memory that the process has held since ResetPeakMemory(), or since it began
+// where the system cannot reset it.
 [[nodiscard]] double PeakMemoryGb();
 void ResetPeakMemory();
 

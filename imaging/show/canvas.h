@@ -20,10 +20,10 @@ inline constexpr Color8 kRedInk = {255, 70, 60};
 inline constexpr Color8 kGreenInk = {70, 220, 90};
 inline constexpr Color8 kBlueInk = {90, 150, 255};
 
-// A colour for each of many things, neighbours unlike each other.
+// Returns a colour for the i-th of many things; neighbours differ clearly.
 [[nodiscard]] Color8 DistinctColor(size_t i);
 
-// A picture to draw on, with smooth edges. Pixel centres at integers.
+// Picture to draw on, with smooth edges. Pixel centres are at integers.
 class Canvas {
  public:
   Canvas(int width, int height, const Color8& paper);
@@ -32,11 +32,11 @@ class Canvas {
             int thickness_px = 1);
   void Dot(const Eigen::Vector2d& at, int radius_px, const Color8& ink);
   void Box(int x, int y, int width, int height, const Color8& ink);
-  // Left end of the base line at `at`; capitals are 12 px high.
-  // Smaller where it would be wider than `widest_px`.
+  // Writes text whose base line starts at `at`; capitals are 12 px high.
+  // Writes text in a smaller size where it would be wider than `widest_px`.
   void Text(const Eigen::Vector2d& at, const std::string& text, const Color8& ink,
             double widest_px = std::numeric_limits<double>::infinity());
-  // The picture with its top left pixel at (x, y); what does not fit is cut off.
+  // Draws the picture with its top left pixel at (x, y); cuts off what does not fit.
   void Place(const Rgb8& picture, int x, int y);
 
   [[nodiscard]] Rgb8 Taken() const;
@@ -47,14 +47,14 @@ class Canvas {
   std::vector<uint8_t> pixels_;  // interleaved red, green, blue
 };
 
-// The panel with a line of text under it.
+// Returns the panel with a line of text under it.
 [[nodiscard]] Rgb8 Captioned(const Rgb8& panel, const std::string& caption);
 
-// "residual, white = 0.012"; `unit` stands after the number.
+// Returns "residual, white = 0.012"; `unit` follows the number.
 [[nodiscard]] std::string HeatCaption(const std::string& what, float white,
                                       const std::string& unit);
 
-// `grey` as large as `width` asks, between pixels linearly, with `factor` = new / old size.
+// Returns `grey` scaled to `width`, linearly between pixels; `factor` = new / old size.
 [[nodiscard]] Rgb8 ScaledGrey(const Image<uint8_t>& grey, double factor);
 
 }  // namespace sateen

@@ -7,19 +7,19 @@
 
 namespace sateen {
 
-// An image shrunk by a whole factor to at most `max_width`, from bands of its rows: the mean of the
-// known pixels of each square, zero where there is none.
+// Image shrunk by a whole factor to at most `max_width`, from bands of its rows. Each pixel is the
+// mean of the known pixels of its square; zero where there is none.
 class Thumbnail {
  public:
   Thumbnail(ImageSize size_px, int max_width, size_t channels);
 
-  // One image for each channel; where `known` is zero a pixel does not count, null: all finite ones do.
+  // Adds rows: one image per channel. A pixel counts where `known` is not zero; null: where finite.
   void Add(int first_row, std::span<const Image<float>> planes, const Image<uint8_t>* known);
 
   [[nodiscard]] int Factor() const { return factor_; }
   [[nodiscard]] Image<float> Mean(size_t channel) const;
   [[nodiscard]] Image3 Means() const { return Colours(Mean(0), Mean(1), Mean(2)); }
-  // 255 where any pixel counted.
+  // Returns 255 where any pixel counted.
   [[nodiscard]] Image<uint8_t> Known() const;
 
  private:

@@ -121,7 +121,7 @@ TEST_F(CaptureCommand, AnExposureThatClipsIsNoDeadEnd) {
 TEST_F(CaptureCommand, ADryRunTakesAndWritesNothing) {
   args_.dry_run = true;
   ASSERT_EQ(Run(), 0) << log_.str();
-  EXPECT_THAT(out_.str(), HasSubstr("could capture 13 frames"));
+  EXPECT_THAT(out_.str(), HasSubstr("ready to capture 13 frames"));
   EXPECT_THAT(out_.str(), HasSubstr("exposure 1/50 s"));
   args_.json = true;
   args_.exposure = "auto";

@@ -150,7 +150,7 @@ TEST_F(CaptureProgram, PreviewByADaemonHearsCtrlC) {
                 Capture("--exposure 1/50 --dry-run") + "\n" + "kill $daemon; wait $daemon\n");
   const ShellResult ended = OnRig("", "sh " + (folder_.Path() / "daemon.sh").string());
   EXPECT_THAT(ended.out, HasSubstr("preview ended with 6"));
-  EXPECT_THAT(ended.out, HasSubstr("could capture 13 frames"));
+  EXPECT_THAT(ended.out, HasSubstr("ready to capture 13 frames"));
   EXPECT_FALSE(fs::exists(look));
   ExpectAllLightsOff();
 }
