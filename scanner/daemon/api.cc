@@ -8,7 +8,7 @@
 #include "scanner/daemon/answer_json.h"
 #include "scanner/daemon/api_json.h"
 #include "scanner/daemon/rig_jobs.h"
-#include "scanner/daemon/solve_job.h"
+#include "scanner/daemon/solve_json.h"
 
 namespace sateen {
 namespace {

@@ -8,7 +8,6 @@
 #include "scanner/capture/preview.h"
 #include "scanner/daemon/board_job.h"
 #include "scanner/daemon/light_job.h"
-#include "scanner/daemon/solve_job.h"
 
 // What the daemon is asked, as JSON and back; docs/api.md has the keys. A key that a request shall have
 // is added to its two functions here. Readers are strict: an unknown key, a wrong type and a value out
@@ -38,12 +37,6 @@ struct PostedPreview {
 [[nodiscard]] std::string PreviewToJson(const PreviewRequest& request,
                                         const std::filesystem::path& output,
                                         const std::string& client);
-
-struct PostedSolve {
-  std::string client;
-  SolveRequest request;
-};
-[[nodiscard]] Result<PostedSolve> SolveFromJson(const std::string& text);
 
 struct PostedLight {
   std::string client;

@@ -1,9 +1,10 @@
+#include "scanner/daemon/solve_json.h"
+
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <vector>
 
 #include "imaging/encoding_name.h"
-#include "scanner/daemon/api_json.h"
 #include "scanner/daemon/request_json.h"
 
 namespace sateen {
