@@ -33,8 +33,8 @@ struct AccuracyRow {
   // methods without uncertainty.
   double standardised_error = 0.0;
   double coverage = 0.0;
-  // Mean relative error of the albedo's colours, and the same two figures of its uncertainty; 0 where
-  // no truth is known.
+  // Mean relative error of the albedo's colours, and the same two figures of its uncertainty; 0
+  // where no truth is known.
   double albedo_error = 0.0;
   double albedo_standardised_error = 0.0;
   double albedo_coverage = 0.0;

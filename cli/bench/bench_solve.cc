@@ -28,9 +28,13 @@ struct BenchCase {
   RenderedRelief rendered;
 };
 
-// Ten near lights each, but "led" and "led+field". Clean has exact radiance, as those have; noisy a 14-bit sensor; hard adds slopes to 75
-// degrees, saturated highlights and lights huddled 20 degrees around the zenith; subnormal is clean
-// at 1e-40 of its radiance.
+// Renders the cases, each under ten near lights unless its name says otherwise:
+//
+//     clean, led, led+field   exact radiance
+//     noisy                   a 14-bit sensor
+//     hard                    the same, slopes to 75 degrees, saturated highlights, and lights within
+//                             20 degrees around the zenith
+//     subnormal               clean at 1e-40 of its radiance
 Result<std::vector<BenchCase>> RenderCases(ImageSize size, const Task& task) {
   const Rig rig = RingRig(size);
   Rig huddled = rig;

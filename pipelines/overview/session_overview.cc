@@ -100,8 +100,8 @@ Rgb8 HeatOf(const Image<float>& values, const std::string& what, const std::stri
   return Captioned(Shrunk(heat, kOverviewPanelPx), HeatCaption(what, top, unit));
 }
 
-// Fails where the maps were solved from other frames. solve.json has the hash of every file that the
-// solve read: at least one frame of this session must be among them.
+// Fails where the maps were solved from other frames. solve.json has the hash of every file that
+// the solve read: at least one frame of this session must be among them.
 Status CheckMapsAreOf(const Session& session, const SessionOverviewOptions& options) {
   const fs::path record = options.maps / "solve.json";
   const Result<std::string> text = ReadFileBytes(record);

@@ -13,19 +13,19 @@
 
 namespace sateen {
 
-// How the camera was set, for the record; what it does to the picture is sensor.full_scale.
+// Settings of the camera, for the record; the picture depends on sensor.full_scale alone.
 struct ExposureRecord {
   double exposure_s = 0.02;
   double f_number = 8.0;
   double iso = 100.0;
-  // A chart: exposure times, each as bright as its time says; empty: exposure_s alone.
+  // Exposure times of a chart, each as bright as its time says; empty: exposure_s alone.
   std::vector<double> series_s = {};
-  std::string series_light;  // the light that has the series; empty: all
+  std::string series_light;  // light that has the series; empty: all
   int repeats = 1;           // frames of each kind
 };
 
 struct SceneFile {
-  std::optional<Eigen::Isometry3d> table_from_target;  // of a sheet, and of what is printed
+  std::optional<Eigen::Isometry3d> table_from_target;  // pose of a sheet, board or chart
   Scene scene;
   std::vector<std::filesystem::path> inputs;  // the scene file and the rig
   std::string title;

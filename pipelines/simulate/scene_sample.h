@@ -9,17 +9,17 @@
 
 namespace sateen {
 
-// The parts of a scene file that describe what lies on the table.
+// Parts of a scene file that describe the object on the table.
 
-// "surface"; files that it names are looked for in `folder`. Finishes `reader` where it succeeds.
+// Reads "surface"; files that it names are relative to `folder`. Finishes `reader` on success.
 [[nodiscard]] Result<SurfacePtr> ReadSurface(JsonReader& reader,
                                              const std::filesystem::path& folder);
 
-// The frame of a plane: z its normal, the table's turned by the shortest way; its origin is the
-// place above the table's.
+// Returns the frame of a plane: its z is the normal, the table's axes turned by the shortest way;
+// its origin is above the table's.
 [[nodiscard]] Eigen::Isometry3d TableFromPlane(const Surface& plane);
 
-// "materials": one for each part of scene.surface.
+// Reads "materials": one for each part of scene.surface.
 [[nodiscard]] Status ReadMaterials(JsonReader reader, Scene& scene);
 
 }  // namespace sateen

@@ -12,9 +12,9 @@ enum class FrameFormat { kRawDng, kLinearExr };
 /// Renders a scene, frame by frame, into a session: frames, rig.json, truth/ (normal, albedo,
 /// height, the share of light per light, the rig) and, last, session.json.
 ///
-/// A RAW value is a fraction of full scale. So that value / H is radiance (scanner/sessions/session.h), the
-/// rig of the session has its flux, and truth nothing else, in the units of that camera: the scene's
-/// times 1 / (full_scale H).
+/// A RAW value is a fraction of full scale, and value / H is radiance (scanner/sessions/session.h).
+/// So the fluxes of the session's rig are the scene's times 1 / (full_scale H), and nothing else of
+/// the truth is scaled.
 [[nodiscard]] Status StageSimulatedSession(const SceneFile& file, FrameFormat format,
                                            const Task& task, OutputFolder& folder);
 

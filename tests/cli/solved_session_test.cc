@@ -67,7 +67,7 @@ TEST_F(SolvedSession, IsShownWithItsMaps) {
 TEST_F(SolvedSession, IsNotShownWithTheMapsOfAnother) {
   const RunResult refused = Overview("hill", "maps");
   EXPECT_EQ(refused.exit_status, 3);
-  EXPECT_THAT(refused.log, HasSubstr("solve.json: tells of other frames than those of"));
+  EXPECT_THAT(refused.log, HasSubstr("solve.json: lists other frames than those of"));
   fs::remove(Path("maps/solve.json"));
   EXPECT_EQ(Overview("dome", "maps").exit_status, 4);
   EXPECT_FALSE(fs::exists(Path("sheet.png")));
