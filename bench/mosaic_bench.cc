@@ -171,7 +171,7 @@ sateen::LightStack Demosaiced(const std::vector<Image<uint16_t>>& readings) {
   return stack;
 }
 
-sateen::MosaicStack StackOf(const sateen::MosaicsInMemory& rows, ImageSize size, size_t frames) {
+sateen::MosaicStack StackOf(std::vector<Image<uint16_t>> readings, ImageSize size) {
   sateen::MosaicFrame frame{.saturated_dn = static_cast<float>(kWhiteDn),
                             .gain_dn = kGainDn,
                             .read_dn = kReadDn,
@@ -180,8 +180,8 @@ sateen::MosaicStack StackOf(const sateen::MosaicsInMemory& rows, ImageSize size,
   frame.at_zero.fill(static_cast<float>(-kBlackDn * kPerDn));
   return {.size_px = size,
           .cfa = kRggb,
-          .lit = std::vector<sateen::MosaicFrame>(frames, frame),
-          .rows = &rows};
+          .lit = std::vector<sateen::MosaicFrame>(readings.size(), frame),
+          .rows = std::make_shared<sateen::MosaicsInMemory>(std::move(readings))};
 }
 
 void MeasureInMemory(ImageSize size, int repeats) {
@@ -192,8 +192,7 @@ void MeasureInMemory(ImageSize size, int repeats) {
     readings.push_back(capture.Expose(k));
   }
   const sateen::Image3 truth = capture.Normals();
-  const sateen::MosaicsInMemory rows(readings);
-  const sateen::MosaicStack mosaics = StackOf(rows, size, readings.size());
+  const sateen::MosaicStack mosaics = StackOf(readings, size);
   NormalField field;
   const auto ns = [&](double seconds) {
     return 1e9 * seconds / static_cast<double>(size.PixelCount());

@@ -5,6 +5,7 @@
 
 #include <vector>
 
+#include "bench/memory_floor/memory_floor.h"
 #include "rig/table_grid.h"
 #include "simulation/relief.h"
 #include "simulation/rigs.h"
@@ -39,42 +40,48 @@ void CountPixels(benchmark::State& state, size_t pixels) {
       benchmark::Counter::kIsIterationInvariantRate | benchmark::Counter::kInvert);
 }
 
-using RowsFunction = void (FastRows::*)(int, int, NormalField&) const;
-
-void BM_Rows(benchmark::State& state, RowsFunction function, LightModel model,
-             float radiance_factor) {
-  const Scene scene = MakeScene(model, radiance_factor);
-  const std::optional<Mask> no_mask;
-  const FastRows rows = FastRows::Make(scene.relief.stack, scene.rig, no_mask, {}).value();
+void BM_Touch(benchmark::State& state) {
+  const Scene scene = MakeScene(LightModel::kNear, 1.0F);
   NormalField field;
   field.Resize(kSize);
   const int step = RowsPerPiece(kSize);
   for (auto _ : state) {
     for (int row = 0; row < kSize.height; row += step) {
-      (rows.*function)(row, row + step, field);
+      TouchRows(scene.relief.stack, row, row + step, field);
     }
     benchmark::DoNotOptimize(field.normal[0].pixels.data());
   }
   CountPixels(state, kSize.PixelCount());
 }
-BENCHMARK_CAPTURE(BM_Rows, touch, &FastRows::Touch, LightModel::kNear, 1.0F);
-BENCHMARK_CAPTURE(BM_Rows, distant, &FastRows::Solve, LightModel::kDistant, 1.0F);
-BENCHMARK_CAPTURE(BM_Rows, near, &FastRows::Solve, LightModel::kNear, 1.0F);
-BENCHMARK_CAPTURE(BM_Rows, near_subnormal, &FastRows::Solve, LightModel::kNear, 1e-40F);
-BENCHMARK_CAPTURE(BM_Rows, led, &FastRows::Solve, LightModel::kLed, 1.0F);
-BENCHMARK_CAPTURE(BM_Rows, led_field, &FastRows::Solve, LightModel::kLedField, 1.0F);
+BENCHMARK(BM_Touch);
+
+void BM_Rows(benchmark::State& state, LightModel model, float radiance_factor) {
+  const Scene scene = MakeScene(model, radiance_factor);
+  const FastRows rows = FastRows::Make({scene.relief.stack, scene.rig}, {}).value();
+  NormalField field;
+  field.Resize(kSize);
+  const int step = RowsPerPiece(kSize);
+  for (auto _ : state) {
+    for (int row = 0; row < kSize.height; row += step) {
+      rows.Solve(row, row + step, field);
+    }
+    benchmark::DoNotOptimize(field.normal[0].pixels.data());
+  }
+  CountPixels(state, kSize.PixelCount());
+}
+BENCHMARK_CAPTURE(BM_Rows, distant, LightModel::kDistant, 1.0F);
+BENCHMARK_CAPTURE(BM_Rows, near, LightModel::kNear, 1.0F);
+BENCHMARK_CAPTURE(BM_Rows, near_subnormal, LightModel::kNear, 1e-40F);
+BENCHMARK_CAPTURE(BM_Rows, led, LightModel::kLed, 1.0F);
+BENCHMARK_CAPTURE(BM_Rows, led_field, LightModel::kLedField, 1.0F);
 
 void BM_WeightedRows(benchmark::State& state, LightModel model) {
   const Scene scene = MakeScene(model, 1.0F);
-  const std::optional<Mask> no_mask;
   const StackNoise noise(scene.relief.stack.size(),
                          {.shot = {1e-4, 1e-4, 1e-4}, .read = {1e-4, 1e-4, 1e-4}});
-  const FastRows rows = FastRows::Make(scene.relief.stack, scene.rig, no_mask, {}, &noise).value();
+  const FastRows rows = FastRows::Make({scene.relief.stack, scene.rig}, {}, &noise).value();
   NormalField field;
-  field.Resize(kSize);
-  field.uncertainty = Image<float>(kSize);
-  field.albedo_uncertainty = Image<float>(kSize);
-  field.model = Image<uint8_t>(kSize);
+  field.Resize(kSize, /*with_ladder=*/true);
   const int step = RowsPerPiece(kSize);
   std::vector<float> misfits(static_cast<size_t>(step) * static_cast<size_t>(kSize.width));
   for (auto _ : state) {

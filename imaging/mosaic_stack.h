@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <string>
 #include <vector>
@@ -65,7 +66,9 @@ struct MosaicStack {
   std::vector<MosaicFrame> lit;
   std::vector<MosaicFrame> dark;  // their mean by `dark_weights` is subtracted
   std::vector<float> dark_weights;
-  const MosaicRows* rows = nullptr;  // frames in the order lit, dark; must outlive the stack
+  // Readings of the frames in the order lit, dark; never null in a stack that is solved. Copies of the
+  // stack share them.
+  std::shared_ptr<const MosaicRows> rows;
 };
 
 }  // namespace sateen

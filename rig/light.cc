@@ -73,6 +73,11 @@ Status Light::Validate(std::string_view what) const {
   return {};
 }
 
+bool AllDistant(const Lights& lights) {
+  return std::ranges::all_of(
+      lights, [](const Light& light) { return light.model == LightModel::kDistant; });
+}
+
 Incident IncidentAt(const Light& light, const Eigen::Vector3d& x_mm) {
   if (light.model == LightModel::kDistant) {
     return {light.direction, light.flux_rgb};  // (1)

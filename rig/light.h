@@ -51,6 +51,9 @@ struct Light {
 
 using Lights = std::vector<Light>;
 
+// Returns whether no light is near.
+[[nodiscard]] bool AllDistant(const Lights& lights);
+
 // Light that arrives at one point from one light.
 struct Incident {
   Eigen::Vector3d l;      // unit vector towards the light

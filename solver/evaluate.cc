@@ -8,15 +8,16 @@
 
 #include "core/angle.h"
 #include "core/check.h"
-#include "imaging/color.h"
+#include "core/statistics.h"
+#include "solver/least_squares/pixel_system.h"
 
 namespace sateen {
 namespace {
 
 constexpr double kLowPassSdMm = 6.62;  // sqrt(ln 2) / (2 pi) * 50 mm: half of the power passes
 constexpr double kSquaresPerSd = 8.0;  // so fine that their size widens G by 0.1 %
-constexpr double kReachSd = 4.0;       // beyond which G is left out
-constexpr double kLeastWeight = 0.2;   // of G
+constexpr double kReachSd = 4.0;       // G is cut off beyond it
+constexpr double kLeastWeight = 0.2;   // share of G on compared pixels
 const double kLeastNz = std::cos(80.0 * kRadPerDeg);
 
 Status CheckSize(const NormalField& field, const Image3& truth, const char* what) {
@@ -34,14 +35,6 @@ Eigen::Vector3d VectorAt(const Image3& image, size_t p) {
           static_cast<double>(image[2].pixels[p])};
 }
 
-// Linear interpolation between order statistics; `sorted` is not empty.
-double Quantile(const std::vector<double>& sorted, double q) {
-  const double place = q * static_cast<double>(sorted.size() - 1);
-  const auto below = static_cast<size_t>(place);
-  const size_t above = std::min(below + 1, sorted.size() - 1);
-  return std::lerp(sorted[below], sorted[above], place - static_cast<double>(below));
-}
-
 ErrorStatistics StatisticsOf(std::vector<double> errors) {
   if (errors.empty()) {
     return {};
@@ -50,12 +43,12 @@ ErrorStatistics StatisticsOf(std::vector<double> errors) {
   const double sum = std::accumulate(errors.begin(), errors.end(), 0.0);
   return {.count = static_cast<int64_t>(errors.size()),
           .mean = sum / static_cast<double>(errors.size()),
-          .median = Quantile(errors, 0.5),
-          .p99 = Quantile(errors, 0.99),
+          .median = InterpolatedQuantile(errors, 0.5),
+          .p99 = InterpolatedQuantile(errors, 0.99),
           .max = errors.back()};
 }
 
-// Sums over the pixels of each square of `side`: how many, and their error of slope.
+// Number of pixels and sums of their slope errors in each square of `side`.
 struct SlopeErrors {
   Image<double> count;
   Image<double> x;
@@ -82,7 +75,7 @@ SlopeErrors SumSlopeErrors(const NormalField& field, const Image3& true_normal, 
   return sums;
 }
 
-// The image by G along x, then transposed, so that twice is along both.
+// Blurs the image by G along x and transposes it. Twice blurs along both.
 Image<double> BlurredAndTransposed(const Image<double>& image, const std::vector<double>& g) {
   const int reach = static_cast<int>(g.size()) - 1;
   Image<double> blurred(image.height, image.width);
@@ -146,7 +139,7 @@ Result<ErrorStatistics> AngularErrorDeg(const NormalField& field, const Image3& 
       continue;
     }
     const Eigen::Vector3d n = VectorAt(field.normal, p);
-    const double angle_deg = std::atan2(n.cross(t).norm(), n.dot(t)) * kDegPerRad;
+    const double angle_deg = AngleBetweenRad(n, t) * kDegPerRad;
     errors_deg.push_back(angle_deg);
     if (map != nullptr) {
       map->pixels[p] = static_cast<float>(angle_deg);
@@ -161,13 +154,10 @@ Result<Image<float>> AlbedoErrorMap(const NormalField& field, const Image3& true
     return tl::unexpected(status.error());
   }
   const auto width = static_cast<size_t>(field.reason.width);
-  const Eigen::Vector3d luminance(static_cast<double>(kLuminance[0]),
-                                  static_cast<double>(kLuminance[1]),
-                                  static_cast<double>(kLuminance[2]));
   Image<float> map(field.reason.Size());
   for (size_t p = 0; p < map.pixels.size(); ++p) {
     const Eigen::Vector3d weights =
-        cfa == nullptr ? luminance
+        cfa == nullptr ? LuminanceWeights()
                        : Eigen::Vector3d::Unit((*cfa)[p / width % 2 * 2 + p % width % 2]);
     const double truth = weights.dot(VectorAt(true_albedo, p));
     if (IsSolved(field, p) && truth > 0.0) {

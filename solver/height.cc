@@ -18,9 +18,9 @@ namespace sateen {
 namespace {
 
 constexpr int kRowsAtOnce = 16;
-constexpr int kLargestFactor = 17;  // of the transform's sides: larger ones are slow
+constexpr int kLargestFactor = 17;  // prime factor of a side; larger ones are slow to transform
 constexpr int kMostSteps = 100;
-constexpr double kTolerance = 1e-4;   // of the misfit, in the preconditioner's norm
+constexpr double kTolerance = 1e-4;   // relative misfit, in the preconditioner's norm
 constexpr double kLeastFacing = 0.1;  // n . v / |v|
 
 bool IsGoodSide(int side) {
@@ -32,7 +32,7 @@ bool IsGoodSide(int side) {
   return side == 1;
 }
 
-// OpenCV's cosine transform wants an even side.
+// Returns the next side that OpenCV's cosine transform, which needs an even one, is fast on.
 int TransformSide(int side) {
   side += side % 2;
   while (!IsGoodSide(side)) {
@@ -41,7 +41,7 @@ int TransformSide(int side) {
   return side;
 }
 
-// Equation (4): pairs of neighbours that are both known, on a grid that the transform likes.
+// Equations (4) of pairs of known neighbours, on a grid of sides that transform fast.
 class Membrane {
  public:
   Membrane(ImageSize size, const Task& task)
@@ -53,11 +53,11 @@ class Membrane {
   Image<uint8_t>& Known() { return known_; }
   [[nodiscard]] ImageSize Size() const { return known_.Size(); }
 
-  // h of A h = b, by preconditioned conjugate gradients. `b` becomes the residual.
+  // Solves A h = b by preconditioned conjugate gradients. `b` becomes the residual.
   Result<Image<float>> Solve(Image<float> b) {
     Image<float> h(Size());
     Image<float> direction(Size());
-    Image<float> image(Size());  // of the direction, then of the residual
+    Image<float> image(Size());  // A times the direction, then the preconditioned residual
     double before = 0.0;
     double first = 0.0;
     for (int step = 0; step < kMostSteps; ++step) {
@@ -85,7 +85,7 @@ class Membrane {
   }
 
  private:
-  // Eigenvalues of the second difference along a side.
+  // Returns the eigenvalues of the second difference along a side.
   static std::vector<float> WavesOf(int side) {
     std::vector<float> waves(static_cast<size_t>(side));
     for (size_t k = 0; k < waves.size(); ++k) {
@@ -97,7 +97,7 @@ class Membrane {
 
   template <typename Body>
   void ForRows(const Body& body) const {
-    const Task unheeded{.threads = task_.threads};  // steps are checked, not rows
+    const Task unheeded{.threads = task_.threads};  // cancelling is checked per step
     const Status status =
         ParallelFor(known_.height, kRowsAtOnce, unheeded, [&](int begin, int end) {
           for (int row = begin; row < end; ++row) {
@@ -117,7 +117,7 @@ class Membrane {
     });
   }
 
-  // Row by row, so that the bits do not depend on the threads.
+  // Adds row by row, so that the bits do not depend on the threads.
   double Dot(const Image<float>& a, const Image<float>& b) const {
     std::vector<double> rows(static_cast<size_t>(known_.height));
     ForRows([&](int row) {
@@ -130,7 +130,7 @@ class Membrane {
     return std::accumulate(rows.begin(), rows.end(), 0.0);
   }
 
-  // A h: the sum of h's differences from those neighbours of a known pixel that are known, too.
+  // Computes A h: the sum of h's differences of a known pixel from its known neighbours.
   void Apply(const Image<float>& h, Image<float>& result) const {
     const auto width = static_cast<size_t>(known_.width);
     ForRows([&](int row) {
@@ -153,7 +153,7 @@ class Membrane {
     });
   }
 
-  // The same equations without gaps, solved by cosine transform.
+  // Solves the equations without gaps by cosine transform.
   void Precondition(const Image<float>& b, Image<float>& result) const {
     result.pixels = b.pixels;
     cv::Mat of_result(known_.height, known_.width, CV_32F, result.pixels.data());
@@ -174,7 +174,7 @@ class Membrane {
   std::vector<float> waves_y_;
 };
 
-// What equation (3) needs of a row; not known: no part in it.
+// Terms of (3) in one row. Pixels that are not known take no part in it.
 struct SlopeRow {
   std::vector<float> x_mm, y_mm;  // x_0
   std::vector<float> s_x, s_y;
@@ -203,14 +203,14 @@ struct SlopeRow {
     }
   }
 
-  // h(y) - h(x) of (3), pixel `at` of this row being x.
+  // Returns h(y) - h(x) of (3). Pixel `at` of this row is x.
   [[nodiscard]] float Rise(size_t at, const SlopeRow& other, size_t other_at) const {
     return -0.5F * ((s_x[at] + other.s_x[other_at]) * (other.x_mm[other_at] - x_mm[at]) +
                     (s_y[at] + other.s_y[other_at]) * (other.y_mm[other_at] - y_mm[at]));
   }
 };
 
-// The right-hand side of (4)'s normal equations, and which pixels are known.
+// Returns the right-hand side of the normal equations of (4) and marks the known pixels.
 Image<float> RisesOf(const NormalField& field, const TableGrid& grid, const Eigen::Vector3d& c,
                      Image<uint8_t>& known) {
   Image<float> b(known.Size());
@@ -238,7 +238,7 @@ Image<float> RisesOf(const NormalField& field, const TableGrid& grid, const Eige
   return b;
 }
 
-// (1) inverted, with the constant that makes the mean of z over the solved pixels 0.
+// Inverts (1), with the constant that makes the mean of z over the solved pixels 0.
 Image<float> HeightOf(const Image<float>& h, const NormalField& field, double camera_z_mm) {
   Image<float> z(field.reason.Size());
   double sum = 0.0;
@@ -272,9 +272,10 @@ Result<Image<float>> IntegrateNormals(const NormalField& field, const Camera& ca
                 size.width, size.height, camera.size_px.width, camera.size_px.height);
   }
   if (!camera.has_pose) {
-    return Fail(ErrorCode::kBadData,
-                "heights need the camera's place above the table, and it has no pose; run sateen "
-                "calibrate pose");
+    return Fail(
+        ErrorCode::kBadData,
+        "heights need the camera's position above the table, but it has no pose; run sateen "
+        "calibrate pose");
   }
   const Result<TableGrid> grid = TableGrid::Make(camera);
   if (!grid) {
@@ -285,7 +286,7 @@ Result<Image<float>> IntegrateNormals(const NormalField& field, const Camera& ca
   Image<float> b = RisesOf(field, *grid, c, membrane.Known());
   if (std::ranges::count(membrane.Known().pixels, uint8_t{1}) == 0) {
     return Fail(ErrorCode::kDegenerate,
-                "no pixel has a normal that faces the camera; need some to tell heights from");
+                "no pixel has a normal that faces the camera; need some to compute heights");
   }
   return membrane.Solve(std::move(b)).map([&](const Image<float>& h) {
     return HeightOf(h, field, c.z());

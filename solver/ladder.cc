@@ -1,27 +1,22 @@
 #include "solver/ladder.h"
 
-#include <Eigen/Core>
 #include <algorithm>
 #include <array>
-#include <chrono>
 #include <cmath>
 #include <utility>
 #include <vector>
 
-#include "core/angle.h"
+#include "core/option_range.h"
 #include "core/parallel.h"
-#include "solver/kernels/consensus.h"
+#include "core/stopwatch.h"
 #include "solver/least_squares/least_squares.h"
 #include "solver/lobe/lobe_search.h"
 #include "solver/robust/climb.h"
+#include "solver/robust/interpolation.h"
 #include "solver/robust/noise_scale.h"
 
 namespace sateen {
 namespace {
-
-using Clock = std::chrono::steady_clock;
-
-constexpr auto kQuarterSquareDegree = static_cast<float>(0.25 * kDegPerRad * kDegPerRad);
 
 constexpr std::array<std::pair<LadderMode, std::string_view>, 3> kModeNames = {{
     {LadderMode::kAuto, "auto"},
@@ -29,11 +24,7 @@ constexpr std::array<std::pair<LadderMode, std::string_view>, 3> kModeNames = {{
     {LadderMode::kConsensus, "robust"},
 }};
 
-double SecondsSince(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
-
-// Adds the model's error to the uncertainty of rung 1.
+// Adds the error of the model to the uncertainties of rung 1.
 Status DoubtLeastSquares(const Doubt& doubt, const Task& task, NormalField& field,
                          PieceSummary& total) {
   const ImageSize size = field.reason.Size();
@@ -52,70 +43,6 @@ Status DoubtLeastSquares(const Doubt& doubt, const Task& task, NormalField& fiel
   total.least_squares_deg = 0.0;
   for (const double sum : sums) {
     total.least_squares_deg += sum;
-  }
-  return status;
-}
-
-// |f(-1) - 2 f + f(+1)|^2 of neighbours `step` apart; one that is unsolved or beyond the border is as far
-// from f as the other.
-template <typename At>
-float SquaredBendAt(const NormalField& field, const At& f, size_t p, size_t step, bool has_before,
-                    bool has_after) {
-  const bool before = has_before && IsSolved(field, p - step);
-  const bool after = has_after && IsSolved(field, p + step);
-  if (before && after) {
-    return (f(p - step) - 2.0F * f(p) + f(p + step)).squaredNorm();
-  }
-  return before  ? 4.0F * (f(p - step) - f(p)).squaredNorm()
-         : after ? 4.0F * (f(p + step) - f(p)).squaredNorm()
-                 : 0.0F;
-}
-
-// (16), and the sums of the uncertainties anew.
-Status DoubtInterpolation(const Task& task, NormalField& field, PieceSummary& total) {
-  const ImageSize size = field.reason.Size();
-  const auto width = static_cast<size_t>(size.width);
-  std::vector<PieceSummary> rows(static_cast<size_t>(size.height));
-  const Task silent{.threads = task.threads, .cancel = task.cancel};
-  const auto normal_at = [&](size_t p) {
-    return Eigen::Vector3f(field.normal[0].pixels[p], field.normal[1].pixels[p],
-                           field.normal[2].pixels[p]);
-  };
-  const auto albedo_at = [&](size_t p) { return Eigen::Matrix<float, 1, 1>(AlbedoAt(field, p)); };
-  Status status = ParallelFor(size.height, RowsPerPiece(size), silent, [&](int begin, int end) {
-    for (int row = begin; row < end; ++row) {
-      PieceSummary& sums = rows[static_cast<size_t>(row)];
-      for (size_t x = 0; x < width; ++x) {
-        const size_t p = field.model.Index(0, row) + x;
-        if (!IsSolved(field, p)) {
-          continue;
-        }
-        const auto bend_of = [&](const auto& f) {
-          return SquaredBendAt(field, f, p, 1, x > 0, x + 1 < width) +
-                 SquaredBendAt(field, f, p, width, row > 0, row + 1 < size.height);
-        };
-        float& uncertainty = field.uncertainty.pixels[p];
-        uncertainty = std::min(180.0F, std::sqrt(uncertainty * uncertainty +
-                                                 kQuarterSquareDegree * bend_of(normal_at)));
-        const float albedo = albedo_at(p).x();
-        float& of_albedo = field.albedo_uncertainty.pixels[p];
-        of_albedo = albedo > 0.0F
-                        ? std::min(1.0F, std::sqrt(of_albedo * of_albedo +
-                                                   0.25F * bend_of(albedo_at) / (albedo * albedo)))
-                        : 1.0F;
-        const auto rung = static_cast<Rung>(field.model.pixels[p]);
-        double& sum = rung <= Rung::kUnchecked ? sums.least_squares_deg
-                      : rung == Rung::kLobe    ? sums.lobe_deg
-                                               : sums.robust_deg;
-        sum += static_cast<double>(uncertainty);
-      }
-    }
-  });
-  total.least_squares_deg = total.robust_deg = total.lobe_deg = 0.0;
-  for (const PieceSummary& row : rows) {
-    total.least_squares_deg += row.least_squares_deg;
-    total.robust_deg += row.robust_deg;
-    total.lobe_deg += row.lobe_deg;
   }
   return status;
 }
@@ -148,7 +75,7 @@ Status CheckOptions(const LightStack& stack, const LadderOptions& options) {
   return CheckNoise(options.noise, stack);
 }
 
-// All rungs, piece by piece.
+// Climbs all rungs, piece by piece.
 Status ClimbAllRows(const Climb& climb, const Task& task, NormalField& field, PieceSummary& total) {
   const ImageSize size = field.reason.Size();
   std::vector<PieceSummary> pieces(static_cast<size_t>(size.height));
@@ -178,44 +105,42 @@ std::optional<LadderMode> LadderModeNamed(std::string_view name) {
   return std::nullopt;
 }
 
-Status LadderOptions::Validate() const {
+Status ClimbOptions::Validate() const {
   if (!(false_alarms > 0.0 && false_alarms < 0.5)) {
-    return Fail(ErrorCode::kInvalidArgument, "false_alarms = {:g}; need 0 < false_alarms < 0.5",
-                false_alarms);
+    return OutOfRange("false_alarms", false_alarms, "0 < false_alarms < 0.5");
   }
   if (!(explained_residual >= 0.0 && explained_residual < 1.0)) {
-    return Fail(ErrorCode::kInvalidArgument,
-                "explained_residual = {:g}; need 0 <= explained_residual < 1", explained_residual);
+    return OutOfRange("explained_residual", explained_residual, "0 <= explained_residual < 1");
   }
-  return least_squares.Validate();
+  return {};
+}
+
+Status LadderOptions::Validate() const {
+  return climb.Validate().and_then([&] { return least_squares.Validate(); });
 }
 
 Status SolveLadderInto(const LightStack& stack, const Rig& rig, const std::optional<Mask>& mask,
-                       const LadderOptions& options, const Task& task, NormalField& field) {
-  const Clock::time_point start = Clock::now();
+                       const LadderOptions& options, const Task& task, NormalField& field,
+                       const std::optional<Image<float>>& height_mm) {
+  const Stopwatch stopwatch;
   if (Status status = CheckOptions(stack, options); !status) {
     return status;
   }
   const StackNoise noise = options.noise ? *options.noise : UnknownNoise(stack.size());
+  const FramesInput input(stack, rig, mask, height_mm);
   const Result<LeastSquaresRows> rows =
-      LeastSquaresRows::Make(stack, rig, mask, options.least_squares, &noise);
+      LeastSquaresRows::Make(input, options.least_squares, &noise);
   if (!rows) {
     return tl::unexpected(rows.error());
   }
-  const ImageSize size = stack[0].rgb.Size();
-  field.Resize(size);
-  if (field.model.Size() != size || field.albedo_uncertainty.Size() != size) {
-    field.uncertainty = Image<float>(size);
-    field.albedo_uncertainty = Image<float>(size);
-    field.model = Image<uint8_t>(size);
-  }
+  field.Resize(stack[0].rgb.Size(), /*with_ladder=*/true);
   field.summary = {};
   const bool known = options.noise.has_value();
-  const NoiseScale scale = FindNoiseScale(stack, mask, *rows, known);
-  Climb climb = MakeClimb(stack, rig, options, *rows, noise, scale.scale_squared);
+  const NoiseScale scale = FindNoiseScale(input, *rows, known);
+  Climb climb = MakeClimb(input, options, *rows, noise, scale.scale_squared);
   if (options.mode == LadderMode::kAuto) {
-    climb.lobe = FindLobe(stack, rig, options.least_squares, noise, scale.scale_squared,
-                          scale.sample, climb.limit, task.ThreadCount());
+    climb.lobe = FindLobe(input, options.least_squares, noise, scale.scale_squared, scale.sample,
+                          climb.limit, task.ThreadCount());
   }
   PieceSummary total;
   if (Status status = ClimbAllRows(climb, task, field, total); !status) {
@@ -232,16 +157,16 @@ Status SolveLadderInto(const LightStack& stack, const Rig& rig, const std::optio
   summary.noise_scale = std::isfinite(climb.scale_squared) ? std::sqrt(climb.scale_squared) : 0.0;
   summary.noise_known = known;
   summary.lobe = climb.lobe;
-  summary.seconds = SecondsSince(start);
+  summary.seconds = stopwatch.Seconds();
   ReportRungs(total, summary);
   return {};
 }
 
 Result<NormalField> SolveLadder(const LightStack& stack, const Rig& rig,
                                 const std::optional<Mask>& mask, const LadderOptions& options,
-                                const Task& task) {
+                                const Task& task, const std::optional<Image<float>>& height_mm) {
   NormalField field;
-  if (Status status = SolveLadderInto(stack, rig, mask, options, task, field); !status) {
+  if (Status status = SolveLadderInto(stack, rig, mask, options, task, field, height_mm); !status) {
     return tl::unexpected(status.error());
   }
   return field;

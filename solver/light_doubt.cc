@@ -20,11 +20,11 @@ struct LightErrors {
   double irradiance = 0.0;  // sd(epsilon)^2
 };
 
-// (2)
+// Returns (2).
 LightErrors ErrorsOf(const Light& light, const Eigen::Vector3d& x_mm) {
   LightErrors errors{.irradiance = std::pow(light.irradiance_sd.value_or(0.0), 2.0)};
   if (light.model == LightModel::kDistant) {
-    // Along two axes, of which one angle to the truth is made.
+    // Half of it lies along each of two axes.
     errors.direction = std::pow(light.direction_sd_deg.value_or(0.0) * kRadPerDeg, 2.0) / 2.0;
   } else if (light.position_sd_mm) {
     const Eigen::Vector3d to_light = light.position_mm - x_mm;
@@ -34,7 +34,7 @@ LightErrors ErrorsOf(const Light& light, const Eigen::Vector3d& x_mm) {
   return errors;
 }
 
-// Of a symmetric matrix, so that n . m n = PackedOf(m) . p.
+// Packs a symmetric matrix so that n . m n = PackedOf(m) . p.
 Vector6d PackedOf(const Eigen::Matrix3d& m) {
   return Vector6d{{m(0, 0), m(1, 1), m(2, 2), m(0, 1), m(0, 2), m(1, 2)}};
 }
@@ -50,7 +50,7 @@ std::array<float, 21> FormOf(const Matrix6d& m) {
   return form;
 }
 
-// (3) at a place on the table. For unit n, 1 = p . (1, 1, 1, 0, 0, 0).
+// Forms of (3) at a place on the table. For unit n, 1 = p . (1, 1, 1, 0, 0, 0).
 struct Forms {
   Matrix6d across = Matrix6d::Zero();
   Matrix6d along = Matrix6d::Zero();
@@ -81,7 +81,7 @@ Forms FormsAt(const Lights& lights, const Eigen::Vector3d& x_mm) {
 
 using Columns = std::array<float, kTile>;
 
-// p . form p of each column, at least 0.
+// Returns p . form p of each column, at least 0.
 Columns ValuesOf(const std::array<float, 21>& form, const std::array<Columns, 6>& p) {
   Columns values = {};
   size_t next = 0;
@@ -103,7 +103,8 @@ void AddInSquares(float error, float most, float& uncertainty) {
   uncertainty = std::min(most, std::sqrt(uncertainty * uncertainty + error * error));
 }
 
-// Where the middle of a tile sees the table; the origin where it does not, or all lights are distant.
+// Returns the table point that the middle of a tile sees; the origin where it sees none or there is
+// no camera.
 Eigen::Vector3d PlaceOf(const Rig& rig, double column, double row) {
   const std::optional<Eigen::Vector3d> place =
       rig.camera ? TablePointOfPixel(*rig.camera, column, row) : std::nullopt;
@@ -137,7 +138,7 @@ void LightDoubt::AddToRow(int row, size_t first, NormalField& field) const {
   for (size_t begin = 0; begin < width; begin += kTile) {
     const size_t count = std::min<size_t>(kTile, width - begin);
     const Tile& tile = tiles_[static_cast<size_t>(row / kTile * columns_) + begin / kTile];
-    // Without branches, so that it becomes vectors.
+    // No branches: becomes vectors.
     std::array<Columns, 6> p = {};
     for (size_t j = 0; j < count; ++j) {
       const float x = field.normal[0].pixels[first + begin + j];

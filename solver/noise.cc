@@ -7,11 +7,11 @@
 namespace sateen {
 namespace {
 
-// Quantile of the normal distribution, for share >= 0.5 or below by symmetry: Abramowitz and Stegun
-// 26.2.23, to 4.5e-4, and a step of Newton's.
-double NormalQuantile(double share) {
+// Returns the quantile of the normal distribution to some 1e-7: Abramowitz and Stegun 26.2.23 and a
+// step of Newton's method.
+double RoughNormalQuantile(double share) {
   if (share < 0.5) {
-    return -NormalQuantile(1.0 - share);
+    return -RoughNormalQuantile(1.0 - share);
   }
   const double t = std::sqrt(-2.0 * std::log(1.0 - share));
   const double z = t - (2.515517 + t * (0.802853 + t * 0.010328)) /
@@ -47,22 +47,15 @@ std::optional<StackNoise> NoiseOf(const LightStack& stack, const Rig& rig) {
   return noise;
 }
 
-float QuantileOf(std::vector<float>& values, double share) {
-  const auto place =
-      values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
-  std::ranges::nth_element(values, place);
-  return *place;
-}
-
 double ReducedChiSquaredQuantile(double share, int freedom) {
   if (freedom == 1) {
-    return std::pow(NormalQuantile(0.5 * (1.0 + share)), 2.0);
+    return std::pow(RoughNormalQuantile(0.5 * (1.0 + share)), 2.0);
   }
   if (freedom == 2) {
     return -std::log(1.0 - share);
   }
   const double v = 2.0 / (9.0 * freedom);
-  return std::pow(std::max(0.0, 1.0 - v + NormalQuantile(share) * std::sqrt(v)), 3.0);
+  return std::pow(std::max(0.0, 1.0 - v + RoughNormalQuantile(share) * std::sqrt(v)), 3.0);
 }
 
 StackNoise UnknownNoise(size_t frames) { return StackNoise(frames); }

@@ -11,16 +11,16 @@ namespace sateen {
 namespace {
 
 constexpr int kRowsPerPiece = 16;
-constexpr double kOnPixel = 1e-9;  // a neighbour of less weight does not count
+constexpr double kOnPixel = 1e-9;  // smallest weight of a neighbour that counts
 
-// A place between pixels: the pixel at or before it, and how far from there.
+// Place between pixels: the pixel at or before it, and the fraction from there.
 struct Place {
   int x;
   int y;
   double u;
   double v;
 
-  // Of the pixel (dx, dy) from it, 0 or 1 each.
+  // Returns the weight of the pixel (dx, dy) from it, 0 or 1 each.
   [[nodiscard]] double Weight(int dx, int dy) const {
     return (dx == 0 ? 1.0 - u : u) * (dy == 0 ? 1.0 - v : v);
   }
@@ -52,7 +52,7 @@ double Linear(const Image<float>& plane, const Place& place) {
   return sum;
 }
 
-// Of the pixels at -1, 0, 1, 2 from the place.
+// Returns the weights of the pixels at -1, 0, 1, 2 from the place.
 std::array<double, 4> CubicWeights(double t) {
   return {t * (t * (1.0 - 0.5 * t) - 0.5), 1.0 + t * t * (1.5 * t - 2.5),
           t * (0.5 + t * (2.0 - 1.5 * t)), t * t * (0.5 * t - 0.5)};
@@ -73,7 +73,7 @@ double Cubic(const Image<float>& plane, const Place& place) {
 
 constexpr auto kSolvedCode = static_cast<uint8_t>(Reason::kSolved);
 
-// Solved, or why not: the reason of the heaviest neighbour that is not.
+// Returns kSolved, or the reason of the heaviest neighbour that is not solved.
 uint8_t ReasonAt(const Image<uint8_t>& reason, const Place& place) {
   uint8_t code = kSolvedCode;
   double heaviest = kOnPixel;
@@ -102,7 +102,7 @@ bool AllSixteenSolved(const Image<uint8_t>& reason, const Place& place) {
   return true;
 }
 
-// Equation (1) for one pixel, which is unsolved and zero so far.
+// Computes (1) for one pixel, which is unsolved and zero so far.
 void Resample(const NormalField& field, const Place& place, int column, int row,
               NormalField& result) {
   const uint8_t code = ReasonAt(field.reason, place);
@@ -139,8 +139,9 @@ Status CheckSize(ImageSize size, const Camera& camera) {
   if (size == camera.size_px) {
     return {};
   }
-  return Fail(ErrorCode::kBadData, "maps of {} x {} px and a camera of {} x {}; need the camera's",
-              size.width, size.height, camera.size_px.width, camera.size_px.height);
+  return Fail(ErrorCode::kBadData,
+              "maps of {} x {} px and a camera of {} x {} px; need the camera's size", size.width,
+              size.height, camera.size_px.width, camera.size_px.height);
 }
 
 // Calls body(column, row, place) for every pixel that has a place.
@@ -164,16 +165,7 @@ Result<NormalField> Undistorted(const NormalField& field, const Camera& camera, 
   const ImageSize size = camera.size_px;
   NormalField result;
   result.summary = field.summary;
-  result.normal = Image3(size);
-  result.albedo = Image3(size);
-  result.residual = Image<float>(size);
-  result.samples = Image<uint8_t>(size);
-  result.reason = Image<uint8_t>(size, static_cast<uint8_t>(Reason::kOutsideMask));
-  if (!field.model.pixels.empty()) {
-    result.uncertainty = Image<float>(size);
-    result.albedo_uncertainty = Image<float>(size);
-    result.model = Image<uint8_t>(size);
-  }
+  result.Resize(size, !field.model.pixels.empty());  // outside the mask and zero everywhere
   const Status done = CheckSize(field.reason.Size(), camera).and_then([&] {
     return ForEachPlace(camera, task, [&](int column, int row, const Place& place) {
       Resample(field, place, column, row, result);

@@ -4,26 +4,27 @@
 #include "core/task.h"
 #include "imaging/image.h"
 #include "rig/camera.h"
-#include "solver/lambertian.h"
+#include "solver/normal_field.h"
 
 namespace sateen {
 
-/// The maps of a solve as PinholeOf(camera) would have them: of the same size and camera matrix,
-/// without distortion.
+/// Resamples the maps of a solve to PinholeOf(camera): the same size and camera matrix, without
+/// distortion.
 ///
 ///     M'(u, v) = M(x),  x = PixelOfPinholePixel(camera, u, v)                                 (1)
 ///
-/// M between pixels by Catmull and Rom's cubic where all 16 around are solved, linearly where only
-/// the nearest four are; normals are then normalised. A pixel is unsolved where one of those four
-/// is, for its reason, and outside the mask where x is outside the image. Samples are the nearest
-/// pixel's, the residual is linear.
+/// Normals and albedo are interpolated by Catmull and Rom's cubic where all 16 pixels around x are
+/// solved, linearly where only the nearest four are; normals are then normalised. Residual and
+/// uncertainties are interpolated linearly, samples and model are the nearest pixel's. A pixel is
+/// unsolved where one of the four is, with its reason. It is outside the mask where x is outside
+/// the image.
 ///
 /// Errors   kBadData: another size than the camera's; kCancelled
-/// Cost     some 0.2 us a pixel and thread
+/// Cost     some 0.2 us per pixel and thread
 [[nodiscard]] Result<NormalField> Undistorted(const NormalField& field, const Camera& camera,
                                               const Task& task = {});
 
-// The same of one plane, linearly; 0 where x is outside the image.
+// Resamples one plane linearly; 0 where x is outside the image.
 [[nodiscard]] Result<Image<float>> Undistorted(const Image<float>& plane, const Camera& camera,
                                                const Task& task = {});
 

@@ -89,7 +89,7 @@ void StoreNormal(const Eigen::Vector3d& n, size_t pixel, NormalField& field) {
 void SolvePerPixel(const Estimator& estimate, const LightStack& stack, const Rig& rig,
                    const std::optional<Mask>& mask, NormalField& field) {
   const LambertianOptions options;
-  PixelSystem system(stack, rig, options);
+  PixelSystem system({stack, rig, mask}, options);
   for (int y = 0; y < field.reason.height; ++y) {
     for (int x = 0; x < field.reason.width; ++x) {
       const size_t pixel = field.reason.Index(x, y);

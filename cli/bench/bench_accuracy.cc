@@ -29,7 +29,7 @@ namespace fs = std::filesystem;
 
 // Others' estimators take up to 0.2 ms a pixel.
 constexpr int64_t kMostPixelsForComparators = 60'000;
-// Uncertainties within which at least 95 of 100 errors lie (solver/ladder.h).
+// Uncertainties within which at least 95 of 100 errors lie (solver/least_squares/weighted.h).
 constexpr float kInterval95 = 1.96F;
 constexpr ImageSize kReliefPx = {1280, 960};
 

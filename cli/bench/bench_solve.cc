@@ -6,13 +6,15 @@
 #include <ostream>
 #include <utility>
 
+#include "bench/memory_floor/memory_floor.h"
 #include "cli/bench/bench_report.h"
 #include "cli/bench/best_seconds.h"
 #include "core/angle.h"
 #include "core/output_folder.h"
 #include "simulation/relief.h"
 #include "simulation/rigs.h"
-#include "solver/least_squares/fast_rows.h"
+#include "solver/kernels/fast_kernel.h"
+#include "solver/lambertian.h"
 
 namespace sateen::cli {
 namespace {
@@ -120,14 +122,9 @@ class Bench {
   }
 
   Status MeasureFloor(const BenchCase& bench_case, int threads) {
-    const std::optional<Mask> no_mask;
-    const Result<FastRows> rows =
-        FastRows::Make(bench_case.rendered.stack, bench_case.rig, no_mask, LambertianOptions{});
-    if (!rows) {
-      return tl::unexpected(rows.error());
-    }
-    const Result<double> seconds = BestSeconds(
-        args_.repeats, [&] { return TouchAllRows(*rows, report_.size, Quiet(threads), field_); });
+    const Result<double> seconds = BestSeconds(args_.repeats, [&] {
+      return TouchAllRows(bench_case.rendered.stack, Quiet(threads), field_);
+    });
     if (!seconds) {
       return tl::unexpected(seconds.error());
     }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <optional>
 #include <utility>
 
 #include "core/stopwatch.h"
@@ -33,12 +34,13 @@ void TakeHeights(Image<float> height_mm, double above_mm, const NormalField& fie
 Result<ReliefOutcome> SolveAtHeights(const SolveOptions& options, const Dataset& dataset,
                                      const Task& task, NormalField& field) {
   const Stopwatch stopwatch;
-  Result<Image<float>> height_mm = IntegrateNormals(field, *dataset.rig.camera, task);
-  if (!height_mm) {
-    return tl::unexpected(height_mm.error());
+  Result<Image<float>> integrated = IntegrateNormals(field, *dataset.rig.camera, task);
+  if (!integrated) {
+    return tl::unexpected(integrated.error());
   }
+  std::optional<Image<float>> height_mm = *std::move(integrated);
   ReliefOutcome relief{.seconds = stopwatch.Seconds()};
-  Result<NormalField> again = SolveFrames(options, dataset, &*height_mm, task);
+  Result<NormalField> again = SolveFrames(options, dataset, height_mm, task);
   if (!again) {
     return tl::unexpected(again.error());
   }

@@ -67,7 +67,7 @@ Status SolveByBands(const SolveOptions& options, const Task& task, OutputFolder&
 Status SolveWhole(const SolveOptions& options, const Task& task, OutputFolder& folder,
                   SolveOutcome& outcome) {
   const Dataset& dataset = outcome.dataset;
-  Result<NormalField> field = SolveFrames(options, dataset, /*height_mm=*/nullptr, task);
+  Result<NormalField> field = SolveFrames(options, dataset, /*height_mm=*/std::nullopt, task);
   if (!field) {
     return tl::unexpected(field.error());
   }

@@ -7,21 +7,21 @@
 namespace sateen {
 
 Result<NormalField> SolveFrames(const SolveOptions& options, const Dataset& dataset,
-                                const Image<float>* height_mm, const Task& task) {
-  LambertianOptions least_squares = options.least_squares;
-  least_squares.height_mm = height_mm;
+                                const std::optional<Image<float>>& height_mm, const Task& task) {
   if (dataset.mosaics) {
     return SolveMosaic(dataset.mosaics->stack, dataset.rig, dataset.mask,
-                       {.mode = options.robust, .least_squares = least_squares}, task);
+                       {.mode = options.robust, .least_squares = options.least_squares}, task,
+                       height_mm);
   }
   if (!options.robust) {
-    return SolveLambertian(dataset.stack, dataset.rig, dataset.mask, least_squares, task);
+    return SolveLambertian(dataset.stack, dataset.rig, dataset.mask, options.least_squares, task,
+                           height_mm);
   }
   return SolveLadder(dataset.stack, dataset.rig, dataset.mask,
                      {.mode = *options.robust,
-                      .least_squares = least_squares,
+                      .least_squares = options.least_squares,
                       .noise = NoiseOf(dataset.stack, dataset.rig)},
-                     task);
+                     task, height_mm);
 }
 
 }  // namespace sateen

@@ -269,13 +269,13 @@ Result<LoadedMosaics> LoadMosaics(const ReadPlan& plan, const std::optional<Sens
   if (const Status decoded = DecodeAll(scratch_dir, task, decoding); !decoded) {
     return tl::unexpected(decoded.error());
   }
-  LoadedMosaics loaded{.readings = std::move(decoding.store), .noise = noise};
+  LoadedMosaics loaded{.noise = noise};
   const auto first_dark = decoding.frames.begin() + static_cast<std::ptrdiff_t>(plan.lit.size());
   loaded.stack = {.size_px = decoding.size_px,
                   .cfa = decoding.cfa,
                   .lit = {decoding.frames.begin(), first_dark},
                   .dark = {first_dark, decoding.frames.end()},
-                  .rows = loaded.readings.get()};
+                  .rows = std::move(decoding.store)};
   double sum = 0.0;
   for (const FrameFile& file : plan.dark) {
     sum += file.exposure * file.exposure;

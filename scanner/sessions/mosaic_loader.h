@@ -3,7 +3,6 @@
 #include <cstdint>
 #include <filesystem>
 #include <map>
-#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -16,10 +15,9 @@
 
 namespace sateen {
 
-// Readings of a capture, and what keeps them: memory, or a file without a name that goes when this does.
+// Readings of a capture. The stack keeps them in memory or in a file without a name that goes with it.
 struct LoadedMosaics {
-  MosaicStack stack;  // its rows are `readings`
-  std::unique_ptr<MosaicRows> readings;
+  MosaicStack stack;
   std::map<std::string, std::string> sha256_of_input;
   std::optional<SensorNoise> noise;  // nothing: not known, or not asked for
 };

@@ -1,5 +1,5 @@
-// The consensus of a vector of pixels, for solver/kernels/fast_kernel.cc: equations (6) to (11) of
-// solver/ladder.h. Compiled once for each instruction set, hence the guard that toggles.
+// Consensus of a vector of pixels, for solver/kernels/fast_kernel.cc: equations (1) to (6) of
+// solver/robust/consensus.h. Compiled once per instruction set, hence the guard that toggles.
 #if defined(SATEEN_SOLVER_CONSENSUS_KERNEL_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef SATEEN_SOLVER_CONSENSUS_KERNEL_INL_H_
 #undef SATEEN_SOLVER_CONSENSUS_KERNEL_INL_H_
@@ -11,7 +11,6 @@
 
 #include <cmath>
 
-#include "solver/kernels/consensus.h"
 #include "solver/kernels/consensus_samples-inl.h"
 #include "solver/kernels/fast_kernel.h"
 #include "solver/kernels/fast_kernel_equations-inl.h"
@@ -19,11 +18,12 @@
 #include "solver/kernels/fast_kernel_vectors-inl.h"
 #include "solver/kernels/fast_kernel_weights-inl.h"
 #include "solver/lambertian.h"
+#include "solver/robust/consensus.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace sateen::HWY_NAMESPACE {
 
-// One of the samples that triples are made of; zero where the pixel has fewer.
+// Sample that triples are made of; zero where the pixel has fewer.
 struct TripleSample {
   V i;
   Vector3 l;
@@ -33,7 +33,7 @@ HWY_INLINE M InBand(const Band& band, V rank) {
   return hn::And(hn::Ge(rank, band.begin), hn::Lt(rank, band.end));
 }
 
-// The samples of (8) in order of rank, in medians; returns how many the fullest lane has.
+// Picks the samples of (3) in order of rank, in medians. Returns the number in the fullest lane.
 HWY_INLINE size_t PickTripleSamples(const Samples& samples, const Band& band, V inverse_median,
                                     TripleSample* picked) {
   const D d;
@@ -68,7 +68,7 @@ HWY_INLINE Vector3 Cross(const Vector3& a, const Vector3& b) {
           hn::MulSub(a.x, b.y, hn::Mul(a.y, b.x))};
 }
 
-// What all triples with the samples a and b have in common.
+// Common terms of all triples with the samples a and b.
 struct Pair {
   Vector3 cross;  // l_a x l_b
   Vector3 mixed;  // i_a l_b - i_b l_a
@@ -80,8 +80,8 @@ HWY_INLINE Pair PairOf(const TripleSample& a, const TripleSample& b) {
            hn::MulSub(a.i, b.l.z, hn::Mul(b.i, a.l.z))}};
 }
 
-// (9): the product of 1 + |r| / c over all samples, each factor divided by 16 to stay in a float. Those
-// that the plane goes through are not left out: to find them costs more than their factors of 1.
+// Returns the product of (4), each factor divided by 16 to stay in a float. The triple's own
+// samples are not left out: finding them costs more than their factors of 1.
 HWY_INLINE V CostOf(const TripleSample* picked, size_t count, const Vector3& n) {
   const D d;
   const V slope = hn::Set(d, 1.0F / (16.0F * kConsensusScale));
@@ -96,8 +96,8 @@ HWY_INLINE V CostOf(const TripleSample* picked, size_t count, const Vector3& n) 
   return cost;
 }
 
-// (8) and (9): of the normals through three samples the one that most of the others agree with;
-// `n` stays where no triple is well conditioned. Returns the product of (9).
+// Finds the N of (3) and (4) and returns its product. `n` stays where no triple is well
+// conditioned.
 HWY_INLINE V SearchTriples(const TripleSample* picked, size_t count, Vector3& n) {
   const D d;
   V best = hn::Set(d, 3e38F);
@@ -122,12 +122,12 @@ HWY_INLINE V SearchTriples(const TripleSample* picked, size_t count, Vector3& n)
       }
     }
   }
-  // Without the sixteenths, of which there are as many as the fullest lane has samples: a pixel's
-  // answer must not depend on its neighbours.
+  // Takes the sixteenths out, whose number is that of the fullest lane: a pixel's answer must not
+  // depend on its neighbours.
   return hn::Mul(best, hn::Set(d, std::exp2(4.0F * static_cast<float>(count))));
 }
 
-// Sums of (10) and (11) at one normal.
+// Sums of (5) and (6) at one normal.
 struct Reweighted {
   Symmetric3 a;  // sum of w l l^T
   Vector3 b[3];  // sum of w l i'_c
@@ -136,7 +136,7 @@ struct Reweighted {
   V agreeing;
 };
 
-// `start`: every sample of the band has weight 1.
+// `start`: gives every sample of the band the weight 1.
 HWY_INLINE Reweighted Reweigh(const Samples& samples, const Band& band, V inverse_median,
                               const Vector3& n, bool start) {
   const D d;
@@ -165,7 +165,7 @@ HWY_INLINE Reweighted Reweigh(const Samples& samples, const Band& band, V invers
   return sums;
 }
 
-// (11), of a variance of VariancesOf().
+// Returns the spread of (6) for a variance of VariancesOf().
 HWY_INLINE V SpreadOf(V variance, const Reweighted& sums) {
   const D d;
   const V freedom = hn::Max(hn::Sub(sums.weights, hn::Set(d, 3.0F)), hn::Set(d, 1.0F));
@@ -204,7 +204,7 @@ HWY_INLINE void StoreConsensus(const Reweighted& sums, const Vector3* n_rgb, con
              output.reason + offset);
 }
 
-// The search of one projection.
+// Search in one projection.
 struct Search {
   V count;
   Band band;
@@ -218,7 +218,7 @@ HWY_INLINE void RankProjected(const KernelParams& params, const Samples& samples
   const D d;
   const V brightest = Project(samples, on);
   search.count = RankSamples(samples, hn::Mul(brightest, hn::Set(d, params.shadow_level)));
-  search.band = BandOf(samples, search.count);  // (7)
+  search.band = BandOf(samples, search.count);  // (2)
   const M known = hn::Gt(search.band.median, hn::Zero(d));
   search.inverse_median =
       hn::Div(hn::Set(d, 1.0F), hn::IfThenElse(known, search.band.median, hn::Set(d, 1.0F)));
@@ -241,7 +241,7 @@ HWY_INLINE Search SearchProjected(const KernelParams& params, const Samples& sam
   return search;
 }
 
-// Of luminance and chroma, in each lane the one with more agreement.
+// Searches luminance and departure from grey; takes the one with more agreement in each lane.
 HWY_INLINE Search SearchBoth(const KernelParams& params, const Samples& samples, float condition,
                              Projection& projection) {
   const D d;
@@ -279,7 +279,7 @@ HWY_INLINE void ConsensusVector(const KernelParams& params, const Gathered& gath
   Reweighted sums;
   Inverse inverse;
   Vector3 n_rgb[3];
-  for (int step = 0; step < kReweightings; ++step) {  // (10)
+  for (int step = 0; step < kReweightings; ++step) {  // (5)
     sums = Reweigh(samples, search.band, search.inverse_median, n, /*start=*/false);
     inverse = Invert(sums.a, condition);
     for (size_t c = 0; c < 3; ++c) {

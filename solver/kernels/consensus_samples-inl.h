@@ -1,5 +1,6 @@
-// The samples of a vector of pixels and their ranks, for solver/kernels/consensus_kernel-inl.h: equations (6)
-// and (7) of solver/ladder.h. Compiled once for each instruction set, hence the guard that toggles.
+// Samples of a vector of pixels and their ranks, for solver/kernels/consensus_kernel-inl.h:
+// equations (1) and (2) of solver/robust/consensus.h. Compiled once per instruction set, hence the
+// guard that toggles.
 #if defined(SATEEN_SOLVER_CONSENSUS_SAMPLES_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef SATEEN_SOLVER_CONSENSUS_SAMPLES_INL_H_
 #undef SATEEN_SOLVER_CONSENSUS_SAMPLES_INL_H_
@@ -10,18 +11,18 @@
 #include <hwy/highway.h>
 
 #include "imaging/color.h"
-#include "solver/kernels/consensus.h"
 #include "solver/kernels/fast_kernel.h"
 #include "solver/kernels/fast_kernel_equations-inl.h"
 #include "solver/kernels/fast_kernel_gather-inl.h"
 #include "solver/kernels/fast_kernel_vectors-inl.h"
+#include "solver/robust/consensus.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace sateen::HWY_NAMESPACE {
 
 HWY_INLINE V One(M mask) { return hn::IfThenElseZero(mask, hn::Set(D(), 1.0F)); }
 
-// Which samples of each lane count: those of rank [begin, end) among the usable, darkest first.
+// Band of samples in each lane: ranks [begin, end) among the usable ones, darkest first.
 struct Band {
   V median;
   V begin;
@@ -59,7 +60,7 @@ struct Samples {
   void SetRank(size_t k, V rank) const { hn::Store(rank, D(), ranks + k * hn::Lanes(D())); }
 };
 
-// What the samples of each lane are projected on: w of (6).
+// w of (1) in each lane.
 struct Projection {
   V w[3];
 
@@ -80,7 +81,8 @@ HWY_INLINE Projection Select(M mask, const Projection& yes, const Projection& no
            hn::IfThenElse(mask, yes.w[2], no.w[2])}};
 }
 
-// On the departure from grey, where a lane has one that counts; `colourful` says where.
+// Returns the projection on the departure from grey in the `colourful` lanes, on luminance in the
+// others.
 HWY_INLINE Projection OnChroma(const Samples& samples, M& colourful) {
   const D d;
   const V zero = hn::Zero(d);
@@ -99,14 +101,15 @@ HWY_INLINE Projection OnChroma(const Samples& samples, M& colourful) {
   const V luminance = hn::MulAdd(
       hn::Set(d, kLuminance[0]), sum[0],
       hn::MulAdd(hn::Set(d, kLuminance[1]), sum[1], hn::Mul(hn::Set(d, kLuminance[2]), sum[2])));
-  // chroma . sum = squared, because chroma adds up to zero: the projections add up to the luminance.
+  // chroma . sum = squared, because chroma adds up to zero: the projections add up to the
+  // luminance.
   const V unit = hn::Div(luminance, hn::IfThenElse(colourful, squared, hn::Set(d, 1.0F)));
   const Projection on_chroma{
       {hn::Mul(chroma.x, unit), hn::Mul(chroma.y, unit), hn::Mul(chroma.z, unit)}};
   return Select(colourful, on_chroma, OnLuminance());
 }
 
-// Fills the values of (6), -1 for samples that are not usable, and returns the brightest.
+// Stores the values of (1), -1 for samples that are not usable. Returns the brightest.
 HWY_INLINE V Project(const Samples& samples, const Projection& on) {
   const D d;
   V brightest = hn::Zero(d);
@@ -121,7 +124,7 @@ HWY_INLINE V Project(const Samples& samples, const Projection& on) {
   return brightest;
 }
 
-// Ranks the usable samples, -1 for the others, and returns how many they are.
+// Ranks the usable samples, -1 for the others. Returns their number.
 HWY_INLINE V RankSamples(const Samples& samples, V threshold) {
   const D d;
   const V one = hn::Set(d, 1.0F);

@@ -22,23 +22,9 @@ HWY_BEFORE_NAMESPACE();
 namespace sateen::HWY_NAMESPACE {
 // ---- One vector of pixels ----------------------------------------------------------------------
 
-HWY_INLINE VI ReasonOf(const Gathered& gathered, M enough, M accepted) {
-  const D d;
-  const DI di;
-  const auto code = [&](Reason reason) { return hn::Set(di, static_cast<int32_t>(reason)); };
-  const auto bits = [&](M mask) { return hn::RebindMask(di, mask); };
-  const M some_saturated = hn::Gt(gathered.saturated, hn::Zero(d));
-  const VI short_of_samples =
-      hn::IfThenElse(bits(some_saturated), code(Reason::kSaturated), code(Reason::kTooFewSamples));
-  const VI with_samples =
-      hn::IfThenElse(bits(accepted), code(Reason::kSolved), code(Reason::kIllConditioned));
-  const VI bright = hn::IfThenElse(bits(enough), with_samples, short_of_samples);
-  return hn::IfThenElse(bits(gathered.bright), bright, code(Reason::kDark));
-}
-
-// N, of luminance, and what else a vector of pixels comes to, as far as it is accepted.
+// Results of a vector of pixels, where it is accepted.
 struct Answer {
-  Vector3 n;
+  Vector3 n;  // N of the luminance
   V albedo[3];
   V sum_of_squares;
   V count;
@@ -70,12 +56,7 @@ HWY_INLINE void SolveVector(const KernelParams& params, const KernelInput& input
   const D d;
   const DI di;
   const V one = hn::Set(d, 1.0F);
-  M inside = hn::Not(NoLanes());
-  if (input.mask != nullptr) {
-    const hn::Rebind<uint8_t, D> du8;
-    const VI mask = hn::PromoteTo(di, hn::LoadU(du8, input.mask + offset));
-    inside = hn::RebindMask(d, hn::Ne(mask, hn::Zero(di)));
-  }
+  const M inside = InsideOf(input.mask, offset);
   if (hn::AllFalse(d, inside)) {
     StoreUnsolved(offset, output);
     return;
@@ -133,7 +114,8 @@ HWY_INLINE void SolveVector(const KernelParams& params, const KernelInput& input
   StoreBytes(
       hn::IfThenElseZero(inside_bits, hn::Min(hn::ConvertTo(di, answer.count), hn::Set(di, 255))),
       output.samples + offset);
-  StoreBytes(hn::IfThenElseZero(inside_bits, ReasonOf(gathered, enough, accepted)),
+  StoreBytes(hn::IfThenElseZero(inside_bits,
+                                ReasonOf(gathered.saturated, gathered.bright, enough, accepted)),
              output.reason + offset);
 }
 
@@ -182,13 +164,6 @@ void SolveConsensusSpanImpl(const KernelParams& params, const KernelInput& input
       });
 }
 
-void TouchSpanImpl(const KernelParams& params, const KernelInput& input,
-                   const KernelOutput& output) {
-  ForEachVector(params, input, output,
-                [&](const KernelInput& in, size_t offset, const KernelOutput& out)
-                    HWY_ATTR { TouchVector(params, in, offset, out); });
-}
-
 std::string_view InstructionSetImpl() { return hwy::TargetName(HWY_TARGET); }
 
 }  // namespace sateen::HWY_NAMESPACE
@@ -200,8 +175,17 @@ namespace sateen {
 HWY_EXPORT(SolveSpanImpl);
 HWY_EXPORT(SolveWeightedSpanImpl);
 HWY_EXPORT(SolveConsensusSpanImpl);
-HWY_EXPORT(TouchSpanImpl);
 HWY_EXPORT(InstructionSetImpl);
+
+KernelLamp KernelLampOf(const Light& light) {
+  const bool is_distant = light.model == LightModel::kDistant;
+  const Eigen::Vector3f place = (is_distant ? light.direction : light.position_mm).cast<float>();
+  const Eigen::Vector3f axis = light.axis.cast<float>();
+  return {.model = light.model,
+          .place = {place.x(), place.y(), place.z()},
+          .axis = {axis.x(), axis.y(), axis.z()},
+          .anisotropy = static_cast<float>(light.anisotropy)};
+}
 
 void SolveSpan(const KernelParams& params, const KernelInput& input, const KernelOutput& output) {
   HWY_DYNAMIC_DISPATCH(SolveSpanImpl)(params, input, output);
@@ -215,10 +199,6 @@ void SolveWeightedSpan(const KernelParams& params, const KernelInput& input,
 void SolveConsensusSpan(const KernelParams& params, const KernelInput& input,
                         const KernelOutput& output) {
   HWY_DYNAMIC_DISPATCH(SolveConsensusSpanImpl)(params, input, output);
-}
-
-void TouchSpan(const KernelParams& params, const KernelInput& input, const KernelOutput& output) {
-  HWY_DYNAMIC_DISPATCH(TouchSpanImpl)(params, input, output);
 }
 
 std::string_view KernelInstructionSet() { return HWY_DYNAMIC_DISPATCH(InstructionSetImpl)(); }

@@ -1,4 +1,4 @@
-// The normal equations of a vector of pixels, for solver/kernels/fast_kernel.cc. Compiled once for each
+// Normal equations of a vector of pixels, for solver/kernels/fast_kernel.cc. Compiled once per
 // instruction set, hence the guard that toggles.
 #if defined(SATEEN_SOLVER_FAST_KERNEL_EQUATIONS_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef SATEEN_SOLVER_FAST_KERNEL_EQUATIONS_INL_H_
@@ -13,6 +13,7 @@
 #include "solver/kernels/fast_kernel.h"
 #include "solver/kernels/fast_kernel_gather-inl.h"
 #include "solver/kernels/fast_kernel_vectors-inl.h"
+#include "solver/normal_field.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace sateen::HWY_NAMESPACE {
@@ -34,7 +35,7 @@ HWY_INLINE void AddScaled(const Vector3& l, V factor, Vector3& sum) {
   sum.z = hn::MulAdd(l.z, factor, sum.z);
 }
 
-// v, zero where the sample is not usable. kAllUsable: all are, which is not asked again.
+// Returns v, or zero where the sample is not usable. kAllUsable: skips the test.
 template <bool kAllUsable = false>
 HWY_INLINE V KeptOf(M usable, V v) {
   if constexpr (kAllUsable) {
@@ -49,9 +50,9 @@ HWY_INLINE Vector3 DirectionOf(const KernelLight& light, const float* slot, M us
   const D d;
   const size_t lanes = hn::Lanes(d);
   if constexpr (kDistant) {
-    return {KeptOf<kAllUsable>(usable, hn::Set(d, light.place[0])),
-            KeptOf<kAllUsable>(usable, hn::Set(d, light.place[1])),
-            KeptOf<kAllUsable>(usable, hn::Set(d, light.place[2]))};
+    return {KeptOf<kAllUsable>(usable, hn::Set(d, light.lamp.place[0])),
+            KeptOf<kAllUsable>(usable, hn::Set(d, light.lamp.place[1])),
+            KeptOf<kAllUsable>(usable, hn::Set(d, light.lamp.place[2]))};
   } else {
     return {KeptOf<kAllUsable>(usable, hn::Load(d, slot)),
             KeptOf<kAllUsable>(usable, hn::Load(d, slot + lanes)),
@@ -151,6 +152,19 @@ HWY_INLINE Residual ResidualOf(const KernelParams& params, const float* scratch,
     AddScaled(l, r, residual.gradient);
   }
   return residual;
+}
+
+HWY_INLINE VI ReasonOf(V saturated, M bright, M enough, M accepted) {
+  const DI di;
+  const auto code = [&](Reason reason) { return hn::Set(di, static_cast<int32_t>(reason)); };
+  const auto bits = [&](M mask) { return hn::RebindMask(di, mask); };
+  const M some_saturated = hn::Gt(saturated, hn::Zero(D()));
+  const VI too_few =
+      hn::IfThenElse(bits(some_saturated), code(Reason::kSaturated), code(Reason::kTooFewSamples));
+  const VI answered =
+      hn::IfThenElse(bits(accepted), code(Reason::kSolved), code(Reason::kIllConditioned));
+  return hn::IfThenElse(bits(bright), hn::IfThenElse(bits(enough), answered, too_few),
+                        code(Reason::kDark));
 }
 
 HWY_INLINE Vector3 LuminanceOf(const Vector3* n) {

@@ -1,5 +1,5 @@
-// What the passes of solver/kernels/fast_kernel.cc read: lights and samples of a vector of pixels.
-// Compiled once for each instruction set, hence the guard that toggles.
+// Lights and samples of a vector of pixels, for the passes of solver/kernels/fast_kernel.cc.
+// Compiled once per instruction set, hence the guard that toggles.
 #if defined(SATEEN_SOLVER_FAST_KERNEL_GATHER_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef SATEEN_SOLVER_FAST_KERNEL_GATHER_INL_H_
 #undef SATEEN_SOLVER_FAST_KERNEL_GATHER_INL_H_
@@ -7,6 +7,7 @@
 #define SATEEN_SOLVER_FAST_KERNEL_GATHER_INL_H_
 #endif
 
+#include <hwy/aligned_allocator.h>
 #include <hwy/cache_control.h>
 #include <hwy/contrib/math/math-inl.h>
 #include <hwy/highway.h>
@@ -19,19 +20,20 @@
 
 HWY_BEFORE_NAMESPACE();
 namespace sateen::HWY_NAMESPACE {
-// Scratch vectors of one light: l (near lights only); i' red, green, blue, luminance; 1 / g (near lights
-// only); N . l. Of the weighted step W and misfit take the place of red and green.
+// Scratch vectors of one light: l (near lights only); i' of red, green, blue and luminance; 1 / g
+// (near lights only); N . l. In the weighted step, W and misfit replace red and green.
 constexpr size_t kScratchPerLight = 9;
 
-// 3 K streams are more than the hardware prefetchers follow. Fetching three cache lines ahead took
-// ten near lights on two cores from 11.5 to 8.1 ns/px (floor 5.9); two to four lines do as well.
+// Floats to prefetch ahead. 3 K streams are more than the hardware prefetchers follow: three cache
+// lines ahead, ten near lights take 8.1 instead of 11.5 ns/px on two cores (floor 5.9). Two to four
+// lines do as well.
 constexpr size_t kPrefetchAhead = 48;
 
 // ---- Pass 1: lights and samples ----------------------------------------------------------------
 
-// The points that the pixels of a vector see.
-template <bool kDistant>
-HWY_INLINE Vector3 PointsAt(const KernelInput& input, size_t offset) {
+// Returns the points that the pixels of a vector see.
+template <bool kDistant, typename Input>
+HWY_INLINE Vector3 PointsAt(const Input& input, size_t offset) {
   const D d;
   const V zero = hn::Zero(d);
   if constexpr (kDistant) {
@@ -41,34 +43,61 @@ HWY_INLINE Vector3 PointsAt(const KernelInput& input, size_t offset) {
           input.z_mm == nullptr ? zero : hn::LoadU(d, input.z_mm + offset)};
 }
 
-// l and the factor that divides the irradiance's geometry out, at x.
+// Direction to a light, and the factor that takes the geometry out of its irradiance.
 struct Incoming {
   Vector3 l;
   V inverse_gain;  // 0 behind an LED
 };
 
-HWY_INLINE Incoming IncomingAt(const KernelLight& light, const Vector3& x_mm) {
+// kDividedFalloff: 1 / cosine by division, else by ReciprocalOf(), whose last bit differs.
+template <bool kDividedFalloff>
+HWY_INLINE Incoming IncomingFromNear(const KernelLamp& lamp, const Vector3& x_mm) {
   const D d;
-  const Vector3 to_light{hn::Sub(hn::Set(d, light.place[0]), x_mm.x),
-                         hn::Sub(hn::Set(d, light.place[1]), x_mm.y),
-                         hn::Sub(hn::Set(d, light.place[2]), x_mm.z)};
+  const V one = hn::Set(d, 1.0F);
+  const Vector3 to_light{hn::Sub(hn::Set(d, lamp.place[0]), x_mm.x),
+                         hn::Sub(hn::Set(d, lamp.place[1]), x_mm.y),
+                         hn::Sub(hn::Set(d, lamp.place[2]), x_mm.z)};
   const V squared = Dot(to_light, to_light);
   const V inverse = ReciprocalRootOf(squared);
   Incoming in{
       {hn::Mul(to_light.x, inverse), hn::Mul(to_light.y, inverse), hn::Mul(to_light.z, inverse)},
       squared};
-  if (IsLed(light.model)) {
-    const Vector3 axis{hn::Set(d, light.axis[0]), hn::Set(d, light.axis[1]),
-                       hn::Set(d, light.axis[2])};
+  if (IsLed(lamp.model)) {
+    const Vector3 axis{hn::Set(d, lamp.axis[0]), hn::Set(d, lamp.axis[1]),
+                       hn::Set(d, lamp.axis[2])};
     const V cosine = hn::Neg(Dot(in.l, axis));
     const M before = hn::Gt(cosine, hn::Zero(d));
-    const V safe = hn::IfThenElse(before, cosine, hn::Set(d, 1.0F));
-    const V falloff = light.anisotropy == 1.0F
-                          ? hn::Div(hn::Set(d, 1.0F), safe)
-                          : hn::Exp(d, hn::Mul(hn::Set(d, -light.anisotropy), hn::Log(d, safe)));
+    const V safe = hn::IfThenElse(before, cosine, one);
+    const V falloff = lamp.anisotropy == 1.0F
+                          ? (kDividedFalloff ? hn::Div(one, safe) : ReciprocalOf(safe))
+                          : hn::Exp(d, hn::Mul(hn::Set(d, -lamp.anisotropy), hn::Log(d, safe)));
     in.inverse_gain = hn::IfThenElseZero(before, hn::Mul(squared, falloff));
   }
   return in;
+}
+
+// `inverse_gains`: 1 / g of a light with a field, at the vector's first pixel.
+template <bool kDividedFalloff>
+HWY_INLINE Incoming IncomingAt(const KernelLamp& lamp, const Vector3& x_mm,
+                               const float* inverse_gains) {
+  const D d;
+  if (lamp.model == LightModel::kDistant) {
+    return {{hn::Set(d, lamp.place[0]), hn::Set(d, lamp.place[1]), hn::Set(d, lamp.place[2])},
+            hn::Set(d, 1.0F)};
+  }
+  Incoming in = IncomingFromNear<kDividedFalloff>(lamp, x_mm);
+  if (lamp.model == LightModel::kLedField) {
+    in.inverse_gain = hn::Mul(in.inverse_gain, hn::LoadU(d, inverse_gains));
+  }
+  return in;
+}
+
+// Returns where the gains of light k begin; null without a field.
+template <typename Input>
+HWY_INLINE const float* GainsOf(const Input& input, size_t k, size_t offset) {
+  return input.inverse_gains == nullptr || input.inverse_gains[k] == nullptr
+             ? nullptr
+             : input.inverse_gains[k] + offset;
 }
 
 HWY_INLINE M AllFinite(V r, V g, V b) {
@@ -80,11 +109,11 @@ struct Gathered {
   V brightest;      // largest i'_k of the unsaturated samples
   V dimmest;        // smallest i'_k; -1 where a sample is saturated or not a number
   V brightest_raw;  // largest radiance of any finite sample
-  V saturated;      // how many samples are saturated
+  V saturated;      // number of saturated samples
   M bright;         // some sample is above its dark level
 };
 
-// Fills the scratch; luminance is -1 for samples that are saturated or not numbers.
+// Fills the scratch. The luminance of samples that are saturated or not numbers is -1.
 template <bool kDistant, bool kScaled>
 HWY_INLINE Gathered Gather(const KernelParams& params, const KernelInput& input, size_t offset,
                            const Vector3& x_mm, const Scale& scale, float* HWY_RESTRICT scratch) {
@@ -117,16 +146,7 @@ HWY_INLINE Gathered Gather(const KernelParams& params, const KernelInput& input,
     b = hn::Mul(b, hn::Set(d, light.inverse_flux[2]));
     float* HWY_RESTRICT slot = scratch + k * kScratchPerLight * lanes;
     if constexpr (!kDistant) {
-      Incoming in;
-      if (light.model == LightModel::kDistant) {
-        in = {{hn::Set(d, light.place[0]), hn::Set(d, light.place[1]), hn::Set(d, light.place[2])},
-              hn::Set(d, 1.0F)};
-      } else {
-        in = IncomingAt(light, x_mm);
-        if (light.model == LightModel::kLedField) {
-          in.inverse_gain = hn::Mul(in.inverse_gain, hn::LoadU(d, input.inverse_gains[k] + offset));
-        }
-      }
+      const Incoming in = IncomingAt<true>(light.lamp, x_mm, GainsOf(input, k, offset));
       r = hn::Mul(r, in.inverse_gain);
       g = hn::Mul(g, in.inverse_gain);
       b = hn::Mul(b, in.inverse_gain);
@@ -156,7 +176,7 @@ HWY_INLINE Gathered Gather(const KernelParams& params, const KernelInput& input,
   return gathered;
 }
 
-// Bits of the brightest channel of any finite sample, also where that is subnormal.
+// Returns the bits of the brightest channel of any finite sample, also where that is subnormal.
 HWY_INLINE VI BrightestBits(const KernelParams& params, const float* const* planes, size_t offset) {
   const D d;
   const DI di;
@@ -172,14 +192,15 @@ HWY_INLINE VI BrightestBits(const KernelParams& params, const float* const* plan
   return brightest;
 }
 
-// What one thread carries from vector to vector.
+// State of one thread from vector to vector.
 struct State {
   hwy::AlignedFreeUniquePtr<float[]> scratch;
-  // The vector before was far from 1. Only a guess that saves a pass: the bits do not depend on it.
+  // Guess that the next vector is as far from 1 as the last. It saves a pass; the bits do not
+  // depend on it.
   bool expect_far_from_one = false;
 };
 
-// Gathers, with `scale` such that no pixel over- or underflows.
+// Gathers; chooses `scale` so that no pixel overflows or underflows.
 template <bool kDistant>
 HWY_INLINE Gathered GatherScaled(const KernelParams& params, const KernelInput& input,
                                  size_t offset, const Vector3& x_mm, Scale& scale, State& state) {

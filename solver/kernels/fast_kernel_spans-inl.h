@@ -1,5 +1,5 @@
-// From spans of any length to whole vectors, for solver/kernels/fast_kernel.cc, and the vectors that need no
-// solve. Compiled once for each instruction set, hence the guard that toggles.
+// Spans of any length as whole vectors, for solver/kernels/fast_kernel.cc, and vectors that need no
+// solve. Compiled once per instruction set, hence the guard that toggles.
 #if defined(SATEEN_SOLVER_FAST_KERNEL_SPANS_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef SATEEN_SOLVER_FAST_KERNEL_SPANS_INL_H_
 #undef SATEEN_SOLVER_FAST_KERNEL_SPANS_INL_H_
@@ -16,7 +16,7 @@
 
 HWY_BEFORE_NAMESPACE();
 namespace sateen::HWY_NAMESPACE {
-// A vector wholly outside the mask.
+// Stores a vector that is wholly outside the mask.
 HWY_INLINE void StoreUnsolved(size_t offset, const KernelOutput& output) {
   const D d;
   for (size_t c = 0; c < 3; ++c) {
@@ -32,23 +32,6 @@ HWY_INLINE void StoreUnsolved(size_t offset, const KernelOutput& output) {
   }
   StoreBytes(hn::Zero(DI()), output.samples + offset);
   StoreBytes(hn::Set(DI(), static_cast<int32_t>(Reason::kOutsideMask)), output.reason + offset);
-}
-
-HWY_INLINE void TouchVector(const KernelParams& params, const KernelInput& input, size_t offset,
-                            const KernelOutput& output) {
-  const D d;
-  V sum = hn::Zero(d);
-  for (size_t p = 0; p < 3 * params.lights.size(); ++p) {
-    sum = hn::Add(sum, hn::LoadU(d, input.planes[p] + offset));
-  }
-  for (size_t c = 0; c < 3; ++c) {
-    hn::StoreU(sum, d, output.normal[c] + offset);
-    hn::StoreU(sum, d, output.albedo[c] + offset);
-  }
-  hn::StoreU(sum, d, output.residual + offset);
-  const VI bytes = hn::Set(DI(), 1);
-  StoreBytes(bytes, output.samples + offset);
-  StoreBytes(bytes, output.reason + offset);
 }
 
 // Runs `solve(input, offset, output)` over whole vectors, then over a padded copy of the rest.

@@ -1,5 +1,5 @@
-// Vectors of pixels for solver/kernels/fast_kernel.cc, and how radiance far from 1 is brought near it.
-// Compiled once for each instruction set, hence the guard that toggles.
+// Vectors of pixels for solver/kernels/fast_kernel.cc, and the scaling of radiance far from 1.
+// Compiled once per instruction set, hence the guard that toggles.
 #if defined(SATEEN_SOLVER_FAST_KERNEL_VECTORS_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef SATEEN_SOLVER_FAST_KERNEL_VECTORS_INL_H_
 #undef SATEEN_SOLVER_FAST_KERNEL_VECTORS_INL_H_
@@ -25,7 +25,7 @@ using V = hn::Vec<D>;
 using VI = hn::Vec<DI>;
 using M = hn::Mask<D>;
 
-// Subnormal inputs count as zero while this lives; SolveVector rescues pixels that need them.
+// Makes subnormal inputs count as zero while it lives. SolveVector scales pixels that need them.
 class FlushSubnormals {
  public:
 #if HWY_ARCH_X86
@@ -49,13 +49,23 @@ HWY_INLINE V Dot(const Vector3& a, const Vector3& b) {
   return hn::MulAdd(a.x, b.x, hn::MulAdd(a.y, b.y, hn::Mul(a.z, b.z)));
 }
 
+// Returns the lanes inside the mask; null: all.
+HWY_INLINE M InsideOf(const uint8_t* mask, size_t offset) {
+  if (mask == nullptr) {
+    return hn::Not(NoLanes());
+  }
+  const hn::Rebind<uint8_t, D> du8;
+  const VI bytes = hn::PromoteTo(DI(), hn::LoadU(du8, mask + offset));
+  return hn::RebindMask(D(), hn::Ne(bytes, hn::Zero(DI())));
+}
+
 HWY_INLINE void StoreBytes(VI values, uint8_t* to) {
   const hn::Rebind<uint8_t, D> du8;
   hn::StoreU(hn::DemoteTo(du8, values), du8, to);
 }
 
-// 1 / v and 1 / sqrt(v) to the last bits but one, for v from 1e-37 to 1e37: an estimate and one step of
-// Newton's, which leave the processor's only divider to others.
+// Returns 1 / v to the last bit but one, for v from 1e-37 to 1e37: an estimate and a step of
+// Newton's method, because the processor has only one divider.
 HWY_INLINE V ReciprocalOf(V v) {
   const D d;
 #if HWY_ARCH_X86
@@ -66,7 +76,7 @@ HWY_INLINE V ReciprocalOf(V v) {
 #endif
 }
 
-// 1 / v and the root of v to some 3e-4, for weights and uncertainties.
+// Returns 1 / v to some 3e-4, for weights and uncertainties.
 HWY_INLINE V RoughReciprocalOf(V v) {
 #if HWY_ARCH_X86
   return hn::ApproximateReciprocal(v);
@@ -75,6 +85,7 @@ HWY_INLINE V RoughReciprocalOf(V v) {
 #endif
 }
 
+// Returns 1 / sqrt(v) as precisely as ReciprocalOf().
 HWY_INLINE V ReciprocalRootOf(V v) {
   const D d;
 #if HWY_ARCH_X86
@@ -86,6 +97,7 @@ HWY_INLINE V ReciprocalRootOf(V v) {
 #endif
 }
 
+// Returns the root of v to some 3e-4.
 HWY_INLINE V RoughRootOf(V v) {
 #if HWY_ARCH_X86
   return hn::Mul(v, hn::ApproximateReciprocalSqrt(hn::Max(v, hn::Set(D(), 1e-37F))));
@@ -96,7 +108,7 @@ HWY_INLINE V RoughRootOf(V v) {
 
 HWY_INLINE V RootOf(V v) { return hn::Mul(v, ReciprocalRootOf(hn::Max(v, hn::Set(D(), 1e-37F)))); }
 
-// The power of two at or below v, a positive number that is not subnormal, and its reciprocal.
+// Returns the power of two at or below v, a positive number that is not subnormal.
 HWY_INLINE V PowerOfTwoBelow(V v) {
   const DI di;
   return hn::BitCast(D(), hn::And(hn::BitCast(di, v), hn::Set(di, 0x7f800000)));
@@ -115,7 +127,7 @@ constexpr int32_t kSmallestNormalBits = 0x00800000;
 constexpr int32_t kInfinityBits = 0x7f800000;
 constexpr float kTwoTo49 = 562949953421312.0F;
 
-// Per lane, a power of two by which samples are multiplied and results divided.
+// Power of two per lane by which samples are multiplied and results divided.
 struct Scale {
   V forward;
   V backward;

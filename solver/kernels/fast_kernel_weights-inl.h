@@ -1,5 +1,5 @@
-// Noise weights for solver/kernels/fast_kernel.cc: equations (1) to (5) of solver/ladder.h. Compiled once for
-// each instruction set, hence the guard that toggles.
+// Noise weights for solver/kernels/fast_kernel.cc: equations (1) to (5) of
+// solver/least_squares/weighted.h. Compiled once per instruction set, hence the guard that toggles.
 #if defined(SATEEN_SOLVER_FAST_KERNEL_WEIGHTS_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef SATEEN_SOLVER_FAST_KERNEL_WEIGHTS_INL_H_
 #undef SATEEN_SOLVER_FAST_KERNEL_WEIGHTS_INL_H_
@@ -24,9 +24,9 @@ constexpr float kDegreesPerRadian = static_cast<float>(180.0 / std::numbers::pi)
 // Weights spread the condition number of A; float holds that much more of it.
 constexpr float kWeightedConditionFactor = 16.0F;
 
-// Bound of a channel's share of the variance, for channels without noise ...
+// Smallest share of a channel in the variance, for channels without noise.
 constexpr float kLeastVarianceShare = 1e-6F;
-// ... and of a sample's variance over `reference`.
+// Smallest variance of a sample relative to `reference`.
 constexpr float kLeastVariance = 1e-9F;
 
 struct Weighted {
@@ -40,7 +40,7 @@ struct Weighted {
   M accepted;
 };
 
-// What the weighted step starts from.
+// Sums that the weighted step starts from.
 struct StartEquations {
   Symmetric3 a;  // sum of l l^T
   Vector3 b;     // sum of l i'
@@ -77,10 +77,10 @@ HWY_INLINE StartEquations AccumulateStart(const KernelParams& params, const floa
   return eq;
 }
 
-// Variances of a solution.
+// Variances of a solution, NormalVariances in vectors.
 struct Variances {
-  V angular;  // of N / |N|, as an angle: (tr C - n C n) / |N|^2
-  V albedo;   // of |N|, over its square: n C n / |N|^2
+  V angular;  // of N / |N|, in radians squared: (tr C - n C n) / |N|^2
+  V albedo;   // of |N|, relative: n C n / |N|^2
 };
 
 HWY_INLINE Variances VariancesOf(const Symmetric3& c, const Vector3& n) {
@@ -104,13 +104,13 @@ HWY_INLINE void AddOuter(const Vector3& l, V weight, Symmetric3& sum) {
   sum.zz = hn::MulAdd(hn::Mul(weight, l.z), l.z, sum.zz);
 }
 
-// What the noise weights of a vector of pixels have in common. With g_k the factor of light k that
+// Common terms of the noise weights of a vector of pixels. With g_k the factor of light k that
 // depends on the place,
 //
 //     sum_c u_c^2 var_kc = reference g_k (max(N . l_k, ..) shot_k . D + g_k read_k . E)
 //
-// where `reference` is the power of two below the sum of the channels' variances on a pixel that faces
-// light 0: float holds the rest whatever the units.
+// where `reference` is the power of two below the sum of the channels' variances on a pixel that
+// faces light 0: float holds the rest in any units.
 struct NoiseUnits {
   V u[3];  // (3)
   V d[3];
@@ -120,7 +120,7 @@ struct NoiseUnits {
   V of_luminance;  // R of (4)
 };
 
-// Variances of (1) on a pixel that faces light 0.
+// Computes them from the variances of (1) on a pixel that faces light 0.
 template <bool kDistant>
 HWY_INLINE NoiseUnits NoiseUnitsOf(const KernelLight& light, const float* slot, const V* b,
                                    const Vector3& n, const Scale& scale) {
@@ -171,7 +171,7 @@ HWY_INLINE NoiseUnits NoiseUnitsOf(const KernelLight& light, const float* slot, 
   return units;
 }
 
-// Sum of a light's three figures times a pixel's.
+// Returns the dot product of three constants of a light and three of a pixel.
 HWY_INLINE V DotOf(const std::array<float, 3>& of_light, const V* of_pixel) {
   const D d;
   return hn::MulAdd(hn::Set(d, of_light[0]), of_pixel[0],
@@ -179,10 +179,10 @@ HWY_INLINE V DotOf(const std::array<float, 3>& of_light, const V* of_pixel) {
                                hn::Mul(hn::Set(d, of_light[2]), of_pixel[2])));
 }
 
-// Fills in N . l_k, zero where the sample is not usable. Returns the sum of squares of the luminance's
-// residuals. It needs no NoiseUnits and runs while they are on their way; in one loop with what follows,
-// few lights fit into the processor's window at a time: the kernel took 22.4 ns a pixel in the cache, and
-// takes 20.7.
+// Stores N . l_k, zero where the sample is not usable. Returns the sum of squares of the
+// luminance's residuals. It is a loop of its own because it does not wait for NoiseUnits: in one
+// loop with the weights, few lights fit into the processor's window, and the kernel took 22.4
+// instead of 20.7 ns per pixel in the cache.
 template <bool kDistant, bool kAllUsable>
 HWY_INLINE V PredictSamples(const KernelParams& params, float* scratch, V threshold,
                             const Vector3& n) {
@@ -201,7 +201,8 @@ HWY_INLINE V PredictSamples(const KernelParams& params, float* scratch, V thresh
   return sum_of_squares;
 }
 
-// Fills in W_k, in units of 1 / `reference` and zero where the sample is not usable, and m_k - N . l_k.
+// Stores m_k - N . l_k and W_k, which is in units of 1 / `reference` and zero where the sample is
+// not usable.
 template <bool kDistant, bool kAllUsable>
 HWY_INLINE void WeighSamples(const KernelParams& params, float* scratch, V threshold,
                              const NoiseUnits& units) {
@@ -257,8 +258,8 @@ HWY_INLINE WeightedSums AccumulateWeighted(const KernelParams& params, const flo
   return sums;
 }
 
-// kAllUsable, of every sample of every lane, as most vectors of a cloth are: the same bits without the
-// masks, which are a tenth of the work.
+// kAllUsable: every sample of every lane is usable, as in most vectors of a cloth. Gives the same
+// bits without the masks, which are a tenth of the work.
 template <bool kDistant, bool kAllUsable>
 HWY_INLINE Weighted SolveWeighted(const KernelParams& params, float* scratch, V threshold,
                                   const Scale& scale) {

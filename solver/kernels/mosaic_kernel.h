@@ -6,22 +6,19 @@
 #include <vector>
 
 #include "imaging/mosaic_stack.h"
-#include "rig/light.h"
+#include "solver/kernels/fast_kernel.h"
 
 namespace sateen {
 
-// One light as the mosaic kernel wants it, by the site of the 2x2 pattern where the colours differ.
-// f = 1 / phi of the site's colour, of distant lights; otherwise 1 / (phi 1e6 mm^2).
+// One light of the mosaic kernel, per site of the 2x2 pattern where the colours differ. f = 1 / phi
+// of the site's colour for distant lights, otherwise 1 / (phi 1e6 mm^2).
 struct MosaicKernelLight {
-  LightModel model = LightModel::kDistant;
-  std::array<float, 3> place = {};  // distant: l; otherwise position_mm
-  std::array<float, 3> axis = {};
-  float anisotropy = 0.0F;
+  KernelLamp lamp;
   float clip_dn = 0.0F;      // a reading of this or more is saturated
   BySite inverse_flux = {};  // f
   BySite per_dn = {};        // f radiance = per_dn reading + at_zero - f dark
   BySite at_zero = {};
-  BySite least = {};  // f radiance above is not dark
+  BySite least = {};  // f radiance above this is not dark
   // Variance of f radiance = f (shot f radiance + f read_squared), in units of noise_unit.
   BySite shot = {};
   BySite read_squared = {};
@@ -29,10 +26,10 @@ struct MosaicKernelLight {
 
 struct MosaicKernelParams {
   std::vector<MosaicKernelLight> lights;
-  // inverse_flux times this is what was asked: a power of two that keeps i' near 1.
+  // Factor on results: the power of two that keeps i' near 1 and is left out of inverse_flux.
   float result_scale = 1.0F;
   float shadow_level = 0.0F;
-  // Refuse where the bound on the condition number of L^T L is above this.
+  // Largest bound on the condition number of L^T L; above it a site is refused.
   float max_condition_squared = 0.0F;
   bool weighted = true;
   float noise_unit = 1.0F;
@@ -45,7 +42,8 @@ struct MosaicKernelInput {
   const float* x_mm = nullptr;  // table positions; null when every light is distant
   const float* y_mm = nullptr;
   const float* z_mm = nullptr;  // heights above the table; null: 0
-  // K pointers to 1 / g of each light's field, null for a light without; null when no light has one.
+  // K pointers to 1 / g of each light's field, null for a light without one; null when no light has
+  // one.
   const float* const* inverse_gains = nullptr;
   const uint8_t* mask = nullptr;  // 0 outside; null: all inside
   int row = 0;
@@ -58,36 +56,33 @@ struct MosaicKernelOutput {
   float* residual = nullptr;
   uint8_t* samples = nullptr;
   uint8_t* reason = nullptr;
-  // With weights alone, may be null without.
+  // Weighted only; may be null without weights.
   float* uncertainty = nullptr;         // degrees
-  float* albedo_uncertainty = nullptr;  // of 1
-  float* misfit = nullptr;              // chi^2 over its degrees of freedom, 0 where there is none
+  float* albedo_uncertainty = nullptr;  // relative
+  float* misfit = nullptr;              // chi^2 over its degrees of freedom, 0 where there are none
 };
 
-// Sites of a row that fill a vector of any instruction set.
+// Number of sites that fills a vector of any instruction set.
 inline constexpr size_t kFewestSites = 64;
 
-/// Least squares of one row of a mosaic, one site a lane: equations (1) to (3) of solver/mosaic/mosaic.h in
-/// float. Sites of usable lights whose condition is above max_condition_squared are kIllConditioned.
-/// Without weights one step of refinement, as in SolveSpan.
+/// Solves one row of a mosaic by least squares, one site per lane: (1) to (3) of
+/// solver/mosaic/mosaic.h in float. Sites are kIllConditioned where the bound on the condition of
+/// their usable lights is above max_condition_squared. Without weights takes one step of
+/// refinement, as SolveSpan does.
 void SolveMosaicRow(const MosaicKernelParams& params, const MosaicKernelInput& input,
                     const MosaicKernelOutput& output);
 
-// Albedo of each site's own colour in a row, and in those above and below; null beyond the border.
+// Albedo of each site's own colour in a row and in its neighbours; null beyond the border.
 struct OwnColours {
   const float* above = nullptr;
   const float* row = nullptr;
   const float* below = nullptr;
 };
 
-// Albedo of all colours in row `row` of an image: the own colour as it is, another one as the mean of
-// the nearest solved sites of that colour among the eight neighbours, the own colour's value where
-// there is none. Zero where the site is not solved.
+// Writes the albedo of all colours in row `row` of an image: the own colour as it is, another one
+// as the mean of the nearest solved sites of that colour among the eight neighbours. Where there is
+// none, takes the own colour's value. Zero where the site is unsolved.
 void InterpolateAlbedoRow(const std::array<uint8_t, 4>& cfa, int row, const OwnColours& own,
                           size_t width, const std::array<float*, 3>& albedo);
-
-// Reads the same readings and writes the same maps, nothing else.
-void TouchMosaicRow(const MosaicKernelParams& params, const MosaicKernelInput& input,
-                    const MosaicKernelOutput& output);
 
 }  // namespace sateen

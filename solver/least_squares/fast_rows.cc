@@ -5,7 +5,6 @@
 #include <span>
 #include <vector>
 
-#include "core/parallel.h"
 #include "solver/least_squares/pixel_system.h"
 
 namespace sateen {
@@ -15,15 +14,10 @@ constexpr int kPixelsPerPiece = 1 << 13;
 
 KernelLight KernelLightOf(const Light& light, const LightFrame& frame, const SampleNoise& noise,
                           double flux_scale, const LambertianOptions& options) {
-  const bool distant = light.model == LightModel::kDistant;
-  const Eigen::Vector3f place = (distant ? light.direction : light.position_mm).cast<float>();
-  const Eigen::Vector3f axis = light.axis.cast<float>();
+  const bool is_distant = light.model == LightModel::kDistant;
   const Eigen::Vector3f inverse_flux =
-      (light.flux_rgb * (distant ? 1.0 : 1e6) / flux_scale).cwiseInverse().cast<float>();
-  KernelLight kernel_light{.model = light.model,
-                           .place = {place.x(), place.y(), place.z()},
-                           .axis = {axis.x(), axis.y(), axis.z()},
-                           .anisotropy = static_cast<float>(light.anisotropy),
+      (light.flux_rgb * (is_distant ? 1.0 : 1e6) / flux_scale).cwiseInverse().cast<float>();
+  KernelLight kernel_light{.lamp = KernelLampOf(light),
                            .inverse_flux = {inverse_flux.x(), inverse_flux.y(), inverse_flux.z()},
                            .clip = ClipThreshold(frame, options),
                            .dark = DarkThreshold(frame, options)};
@@ -51,33 +45,24 @@ double FluxScale(const Lights& lights) {
   return std::exp2(std::round(sum / static_cast<double>(lights.size())));
 }
 
-bool AllDistant(const Lights& lights) {
-  return std::all_of(lights.begin(), lights.end(),
-                     [](const Light& light) { return light.model == LightModel::kDistant; });
-}
-
 int RowsPerPiece(ImageSize size) { return std::max(1, kPixelsPerPiece / size.width); }
 
-size_t BytesPerPixel(size_t light_count) {
-  return (3 * light_count + 7) * sizeof(float) + 2 * sizeof(uint8_t);
-}
-
-Result<FastRows> FastRows::Make(const LightStack& stack, const Rig& rig,
-                                const std::optional<Mask>& mask, const LambertianOptions& options,
+Result<FastRows> FastRows::Make(const FramesInput& input, const LambertianOptions& options,
                                 const StackNoise* noise) {
-  Result<PixelLocator> locator = PixelLocator::Make(rig, options.height_mm);
+  Result<PixelLocator> locator = PixelLocator::Make(input.rig, input.height_mm);
   if (!locator) {
     return tl::unexpected(locator.error());
   }
-  FastRows rows(stack, mask, *std::move(locator));
+  FastRows rows(input, *std::move(locator));
+  const Lights& lights = input.rig.lights;
   rows.params_.shadow_level = static_cast<float>(options.shadow_level);
   rows.params_.max_condition_squared = std::min(
       static_cast<float>(options.max_condition * options.max_condition), kFloatConditionSquared);
-  const double flux_scale = FluxScale(rig.lights);
+  const double flux_scale = FluxScale(lights);
   rows.params_.result_scale = static_cast<float>(1.0 / flux_scale);
-  for (size_t k = 0; k < stack.size(); ++k) {
+  for (size_t k = 0; k < lights.size(); ++k) {
     rows.params_.lights.push_back(KernelLightOf(
-        rig.lights[k], stack[k], noise ? (*noise)[k] : SampleNoise{}, flux_scale, options));
+        lights[k], input.stack[k], noise ? (*noise)[k] : SampleNoise{}, flux_scale, options));
   }
   return rows;
 }
@@ -97,10 +82,6 @@ void FastRows::SolveWeighted(int begin, int end, const PixelGeometry& geometry, 
   Run(SolveWeightedSpan, begin, end, geometry, field, misfits.data(), noise_scale);
 }
 
-void FastRows::Touch(int begin, int end, NormalField& field) const {
-  Run(TouchSpan, begin, end, {}, field, nullptr);
-}
-
 void FastRows::Run(SpanFunction function, int begin, int end, const PixelGeometry& geometry,
                    NormalField& field, float* misfits, double noise_scale) const {
   const size_t first = field.reason.Index(0, begin);
@@ -118,7 +99,7 @@ void FastRows::Run(SpanFunction function, int begin, int end, const PixelGeometr
             .y_mm = geometry.y_mm.empty() ? nullptr : geometry.y_mm.data(),
             .z_mm = geometry.z_mm.empty() ? nullptr : geometry.z_mm.data(),
             .inverse_gains = geometry.places.empty() ? nullptr : geometry.places.data(),
-            .mask = *mask_ ? at(**mask_) : nullptr,
+            .mask = mask_ != nullptr ? at(*mask_) : nullptr,
             .count = count,
             .noise_scale = static_cast<float>(noise_scale)},
            {.normal = {at(field.normal[0]), at(field.normal[1]), at(field.normal[2])},
@@ -245,12 +226,6 @@ void FastRows::SolveConsensus(const ListedPixels& listed, NormalField& field,
     field.uncertainty.pixels[pixel] = result(7)[j];
     field.albedo_uncertainty.pixels[pixel] = result(8)[j];
   }
-}
-
-Status TouchAllRows(const FastRows& rows, ImageSize size, const Task& task, NormalField& field) {
-  field.Resize(size);
-  return ParallelFor(size.height, RowsPerPiece(size), task,
-                     [&](int begin, int end) { rows.Touch(begin, end, field); });
 }
 
 }  // namespace sateen

@@ -11,55 +11,56 @@
 #include "solver/lambertian.h"
 #include "solver/least_squares/pixel_geometry.h"
 #include "solver/noise.h"
+#include "solver/solve_input.h"
 
 namespace sateen {
 
-// Pixels anywhere in a stack, side by side with their geometry, so that every lane of a vector has work.
+// Pixels anywhere in a stack with their geometry, side by side so that every lane of a vector has
+// work.
 struct ListedPixels {
   std::vector<size_t> pixels;
   std::vector<float> x_mm;  // zero where all lights are distant
   std::vector<float> y_mm;
   std::vector<float> z_mm;                // empty where the surface is the table plane
-  std::vector<std::vector<float>> gains;  // of each light; empty without a field
+  std::vector<std::vector<float>> gains;  // per light; empty without a field
 
   // Appends pixels whose geometry starts with pixel `first`.
   void Append(const PixelGeometry& geometry, size_t first, std::span<const size_t> more);
 };
 
-// Feeds rows of a stack to the kernel. Borrows the stack and the mask, which must have been checked
-// (SolveLambertian does).
+// Feeds rows of a stack to the kernel. Borrows the stack and the mask for the time of one solve;
+// both must have been checked, as SolveLambertian does.
 class FastRows {
  public:
-  // kBadData where a near light needs table positions and a pixel does not see the table.
-  [[nodiscard]] static Result<FastRows> Make(const LightStack& stack, const Rig& rig,
-                                             const std::optional<Mask>& mask,
+  // Fails with kBadData where a near light needs table positions and a pixel does not see the
+  // table.
+  [[nodiscard]] static Result<FastRows> Make(const FramesInput& input,
                                              const LambertianOptions& options,
                                              const StackNoise* noise = nullptr);
 
-  // Of the pixels of rows [begin, end).
+  // Returns the geometry of rows [begin, end).
   [[nodiscard]] PixelGeometry GeometryOf(int begin, int end) const;
 
   // Solves rows [begin, end) into `field`; refused pixels are kIllConditioned.
   void Solve(int begin, int end, NormalField& field) const;
-  // With weights, for which there must be noise: also both uncertainties, times noise_scale, field.model
-  // and the misfit of each pixel.
+  // Solves with weights, for which Make() must have had noise: also writes both uncertainties,
+  // times noise_scale, field.model and the misfit of each pixel.
   void SolveWeighted(int begin, int end, const PixelGeometry& geometry, double noise_scale,
                      NormalField& field, std::span<float> misfits) const;
-  // Misfit, usable samples and reason of pixels anywhere, in order of their indices.
+  // Computes misfit, usable samples and reason of pixels anywhere, in order of their indices.
   void MisfitsAt(std::span<const size_t> pixels, std::span<float> misfits,
                  std::span<uint8_t> samples, std::span<uint8_t> reasons) const;
-  // Rung 2 for listed pixels, into `field`. The others' content stays, and so does that of a listed pixel
-  // without an answer. `agreeing`, one for each, receives how many samples agree, 0 without an answer.
+  // Solves listed pixels on rung 2 into `field`. The content of other pixels stays, and so does
+  // that of a listed pixel without an answer. `agreeing` receives the number of samples that agree,
+  // 0 without an answer.
   void SolveConsensus(const ListedPixels& listed, NormalField& field,
                       std::span<uint8_t> agreeing) const;
-  // Reads and writes the same bytes and only adds them up: the floor of Solve.
-  void Touch(int begin, int end, NormalField& field) const;
 
  private:
   using SpanFunction = void (*)(const KernelParams&, const KernelInput&, const KernelOutput&);
 
-  FastRows(const LightStack& stack, const std::optional<Mask>& mask, PixelLocator locator)
-      : stack_(&stack), mask_(&mask), locator_(std::move(locator)) {}
+  FastRows(const FramesInput& input, PixelLocator locator)
+      : stack_(&input.stack), mask_(input.mask), locator_(std::move(locator)) {}
   void Run(SpanFunction function, int begin, int end, const PixelGeometry& geometry,
            NormalField& field, float* misfits, double noise_scale = 1.0) const;
   // Runs `function` over listed pixels.
@@ -67,26 +68,19 @@ class FastRows {
                  const KernelOutput& output) const;
 
   const LightStack* stack_;
-  const std::optional<Mask>* mask_;
+  const Mask* mask_;  // null: all pixels
   PixelLocator locator_;
   KernelParams params_;
 };
 
-// Rows that one thread takes at a time: about 8,000 pixels, so that positions stay in its cache.
+// Returns the number of rows per thread and step: about 8,000 pixels, so that positions stay in its
+// cache.
 [[nodiscard]] int RowsPerPiece(ImageSize size);
 
-[[nodiscard]] bool AllDistant(const Lights& lights);
-
-// Irradiance that the light's green flux gives at the table's origin, or phi itself.
+// Returns the irradiance at the table's origin of a light's green flux, or phi of a distant light.
 [[nodiscard]] double TypicalIrradiance(const Light& light);
-// The power of two next to the lights' geometric mean of it: fluxes come in any unit.
+// Returns the power of two next to the geometric mean of TypicalIrradiance(): fluxes come in any
+// unit.
 [[nodiscard]] double FluxScale(const Lights& lights);
-
-// Runs Touch over a whole image: what SolveLambertian would take if memory were the only cost.
-[[nodiscard]] Status TouchAllRows(const FastRows& rows, ImageSize size, const Task& task,
-                                  NormalField& field);
-
-// Bytes that Solve and Touch read and write for each pixel.
-[[nodiscard]] size_t BytesPerPixel(size_t light_count);
 
 }  // namespace sateen

@@ -13,7 +13,8 @@ namespace {
 constexpr int kFirstSpacingPx = 16;
 constexpr double kLargestError = 2e-6;  // of 1 / g, in the middle of each cell
 
-// At a spacing of 1 every pixel is a knot, also where there are fewer pixels than a cubic has knots.
+// Returns the number of intervals. At a spacing of 1 every pixel is a knot, also where there are
+// fewer pixels than a cubic has knots.
 int IntervalsFor(int pixels, int spacing_px) {
   if (spacing_px == 1 && pixels == 3) {
     return 4;

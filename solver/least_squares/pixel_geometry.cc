@@ -9,10 +9,7 @@ namespace sateen {
 
 Result<PixelLocator> PixelLocator::Make(const Rig& rig, const Image<float>* height_mm) {
   PixelLocator locator;
-  const auto is = [&](auto model) {
-    return [model](const Light& light) { return light.model == model; };
-  };
-  if (!std::ranges::all_of(rig.lights, is(LightModel::kDistant))) {
+  if (!AllDistant(rig.lights)) {
     Result<TableGrid> grid = TableGrid::Make(*rig.camera);
     if (!grid) {
       return tl::unexpected(grid.error());
@@ -21,7 +18,8 @@ Result<PixelLocator> PixelLocator::Make(const Rig& rig, const Image<float>* heig
     locator.height_mm_ = height_mm;
     locator.camera_mm_ = rig.camera->table_from_camera.translation().cast<float>();
   }
-  if (std::ranges::any_of(rig.lights, is(LightModel::kLedField))) {
+  if (std::ranges::any_of(
+          rig.lights, [](const Light& light) { return light.model == LightModel::kLedField; })) {
     Result<GainRows> gains = GainRows::Make(*rig.camera, rig.lights);
     if (!gains) {
       return tl::unexpected(gains.error());

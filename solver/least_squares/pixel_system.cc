@@ -2,11 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "imaging/color.h"
 
 namespace sateen {
+
+Eigen::Vector3d LuminanceWeights() {
+  return {static_cast<double>(kLuminance[0]), static_cast<double>(kLuminance[1]),
+          static_cast<double>(kLuminance[2])};
+}
 
 float ClipThreshold(const LightFrame& frame, const LambertianOptions& options) {
   return static_cast<float>(options.clip_level * static_cast<double>(frame.full_scale));
@@ -18,34 +22,31 @@ float DarkThreshold(const LightFrame& frame, const LambertianOptions& options) {
              : 0.0F;
 }
 
-PixelSystem::PixelSystem(const LightStack& stack, const Rig& rig, const LambertianOptions& options)
-    : stack_(stack),
-      rig_(rig),
+PixelSystem::PixelSystem(const FramesInput& input, const LambertianOptions& options)
+    : input_(input),
       options_(options),
-      needs_position_(
-          std::any_of(rig.lights.begin(), rig.lights.end(),
-                      [](const Light& light) { return light.model != LightModel::kDistant; })),
-      l_(static_cast<Eigen::Index>(stack.size()), 3),
-      rhs_(static_cast<Eigen::Index>(stack.size()), 4),
-      e_(static_cast<Eigen::Index>(stack.size()), 3),
-      frames_(stack.size()) {}
+      needs_position_(!AllDistant(input.rig.lights)),
+      l_(static_cast<Eigen::Index>(input.stack.size()), 3),
+      rhs_(static_cast<Eigen::Index>(input.stack.size()), 4),
+      e_(static_cast<Eigen::Index>(input.stack.size()), 3),
+      frames_(input.stack.size()) {}
 
 std::optional<Eigen::Vector3d> PixelSystem::TablePoint(int column, int row) const {
   if (!needs_position_) {
     return Eigen::Vector3d::Zero();
   }
-  return TablePointOfPixel(*rig_.camera, column, row, options_.HeightAt(column, row));
+  return TablePointOfPixel(*input_.rig.camera, column, row, input_.HeightAt(column, row));
 }
 
 void PixelSystem::Gather(int column, int row) {
   const std::optional<Eigen::Vector3d> x_mm = TablePoint(column, row);
-  const size_t pixel = stack_[0].rgb[0].Index(column, row);
+  const size_t pixel = input_.stack[0].rgb[0].Index(column, row);
   count_ = 0;
   saturated_ = 0;
   bright_ = false;
   double brightest = 0.0;
-  for (size_t k = 0; x_mm && k < stack_.size(); ++k) {
-    const LightFrame& frame = stack_[k];
+  for (size_t k = 0; x_mm && k < input_.stack.size(); ++k) {
+    const LightFrame& frame = input_.stack[k];
     const Eigen::Vector3f i(frame.rgb[0].pixels[pixel], frame.rgb[1].pixels[pixel],
                             frame.rgb[2].pixels[pixel]);
     if (!i.allFinite()) {
@@ -56,14 +57,12 @@ void PixelSystem::Gather(int column, int row) {
       ++saturated_;
       continue;
     }
-    const Incident incident = IncidentAt(rig_.lights[k], *x_mm);
+    const Incident incident = IncidentAt(input_.rig.lights[k], *x_mm);
     if (!(incident.e_rgb.minCoeff() > 0.0)) {
       continue;  // behind the LED
     }
     const Eigen::Vector3d scaled = i.cast<double>().cwiseQuotient(incident.e_rgb);  // (2)
-    const double luminance = scaled.dot(Eigen::Vector3d(static_cast<double>(kLuminance[0]),
-                                                        static_cast<double>(kLuminance[1]),
-                                                        static_cast<double>(kLuminance[2])));
+    const double luminance = scaled.dot(LuminanceWeights());
     brightest = std::max(brightest, luminance);
     l_.row(count_) = incident.l.transpose();
     rhs_.row(count_) << scaled.transpose(), luminance;

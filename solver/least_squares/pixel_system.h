@@ -4,22 +4,21 @@
 #include <optional>
 #include <vector>
 
-#include "imaging/light_stack.h"
-#include "rig/rig.h"
 #include "solver/lambertian.h"
+#include "solver/solve_input.h"
 
 namespace sateen {
 
-// Equation (3) of solver/lambertian.h for one pixel, in double: the usable samples, or the reason
+// One pixel of equation (3) of solver/lambertian.h, in double: its usable samples, or the reason
 // why there are too few. The plain form that the fast kernel is tested against.
 class PixelSystem {
  public:
-  PixelSystem(const LightStack& stack, const Rig& rig, const LambertianOptions& options);
+  PixelSystem(const FramesInput& input, const LambertianOptions& options);
 
   // Gathers the usable samples of pixel (column, row).
   void Gather(int column, int row);
 
-  // kSolved when there are at least three usable samples; otherwise why not.
+  // Returns kSolved where at least three samples are usable, otherwise why they are not.
   [[nodiscard]] Reason SampleReason() const;
   [[nodiscard]] int Count() const { return count_; }
   // Count() x 3: the l_k of the usable samples.
@@ -28,7 +27,7 @@ class PixelSystem {
   [[nodiscard]] auto Rhs() const { return rhs_.topRows(count_); }
   // Count() x 3: e_kr, e_kg, e_kb.
   [[nodiscard]] auto E() const { return e_.topRows(count_); }
-  // Which frame a usable sample is of.
+  // Returns the frame of a usable sample.
   [[nodiscard]] int FrameOf(Eigen::Index sample) const {
     return frames_[static_cast<size_t>(sample)];
   }
@@ -37,8 +36,7 @@ class PixelSystem {
  private:
   std::optional<Eigen::Vector3d> TablePoint(int column, int row) const;
 
-  const LightStack& stack_;
-  const Rig& rig_;
+  FramesInput input_;
   const LambertianOptions& options_;
   bool needs_position_ = false;
   Eigen::MatrixXd l_;
@@ -50,7 +48,11 @@ class PixelSystem {
   bool bright_ = false;
 };
 
-// Thresholds of one frame in radiance, shared by all backends so that they agree to the bit.
+// Returns the weights of red, green and blue in a luminance.
+[[nodiscard]] Eigen::Vector3d LuminanceWeights();
+
+// Return the thresholds of one frame in radiance. All backends share them, so that they agree to
+// the bit.
 [[nodiscard]] float ClipThreshold(const LightFrame& frame, const LambertianOptions& options);
 [[nodiscard]] float DarkThreshold(const LightFrame& frame, const LambertianOptions& options);
 

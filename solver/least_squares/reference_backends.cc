@@ -18,7 +18,7 @@ struct Solution {
   double condition = std::numeric_limits<double>::infinity();
 };
 
-// As the source and textbooks have it: dynamic size, double, decomposed anew for each pixel.
+// Textbook form: dynamic size, double, one decomposition per pixel.
 struct JacobiSvd {
   static Solution Solve(const PixelSystem& system) {
     const SvdSolution solution = SolveBySvd(system.L(), system.Rhs());
@@ -53,9 +53,9 @@ void Store(const PixelSystem& system, const Solution& solution, size_t pixel, No
 }
 
 template <typename Method>
-void SolveRows(const LightStack& stack, const Rig& rig, const LambertianOptions& options,
-               Reason which, int row_begin, int row_end, NormalField& field) {
-  PixelSystem system(stack, rig, options);
+void SolveRows(const FramesInput& input, const LambertianOptions& options, Reason which,
+               int row_begin, int row_end, NormalField& field) {
+  PixelSystem system(input, options);
   for (int row = row_begin; row < row_end; ++row) {
     for (int column = 0; column < field.reason.width; ++column) {
       const size_t pixel = field.reason.Index(column, row);
@@ -80,16 +80,15 @@ void SolveRows(const LightStack& stack, const Rig& rig, const LambertianOptions&
 
 }  // namespace
 
-void SolveRowsInDouble(const LightStack& stack, const Rig& rig, const LambertianOptions& options,
-                       Backend backend, Reason which, int row_begin, int row_end,
-                       NormalField& field) {
+void SolveRowsInDouble(const FramesInput& input, const LambertianOptions& options, Backend backend,
+                       Reason which, int row_begin, int row_end, NormalField& field) {
   switch (backend) {
     case Backend::kJacobiSvd:
-      return SolveRows<JacobiSvd>(stack, rig, options, which, row_begin, row_end, field);
+      return SolveRows<JacobiSvd>(input, options, which, row_begin, row_end, field);
     case Backend::kQr:
-      return SolveRows<Qr>(stack, rig, options, which, row_begin, row_end, field);
+      return SolveRows<Qr>(input, options, which, row_begin, row_end, field);
     case Backend::kLdlt:
-      return SolveRows<Ldlt>(stack, rig, options, which, row_begin, row_end, field);
+      return SolveRows<Ldlt>(input, options, which, row_begin, row_end, field);
     case Backend::kFast:
     case Backend::kAuto:
       break;

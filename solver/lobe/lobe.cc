@@ -11,44 +11,35 @@
 #include <vector>
 
 #include "core/angle.h"
+#include "core/gauss_newton.h"
 #include "core/linear_algebra.h"
 #include "imaging/color.h"
 
 namespace sateen {
 namespace {
 
-constexpr int kLobeSteps = 12;
-constexpr int kHalvings = 4;
-constexpr double kLobeConverged = 1e-6;  // of chi^2
-constexpr double kLeastBody = 0.05;      // of least squares', to start from
+constexpr GaussNewtonOptions kLobeSteps = {
+    .rule = StepRule::kHalving, .max_iterations = 12, .max_attempts = 5, .min_relative_fall = 1e-6};
+constexpr double kLeastBody = 0.05;  // to start from, relative to that of least squares
 
-// The pixel at N: chi^2 = sum_k w_k r_k^2, J^T W J and J^T W r.
-struct Evaluation {
-  double chi_squared = 0.0;
-  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
-  Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
-};
-
-Evaluation EvaluateAt(const LobeSamples& samples, const LobeShape& shape,
-                      const Eigen::Vector3d& n) {
+// Returns chi^2 of a pixel at N, J^T W J and J^T W r.
+NormalEquations<3> EvaluateAt(const LobeSamples& samples, const LobeShape& shape,
+                              const Eigen::Vector3d& n) {
   const double length = n.norm();
   const Eigen::Vector3d unit = n / length;
-  Evaluation sums;
+  NormalEquations<3> sums;
   for (Eigen::Index k = 0; k < samples.l.rows(); ++k) {
     const Eigen::Vector3d l = samples.l.row(k).transpose();
     const LobeTerm s = shape.At(unit, l, samples.v, samples.halves[static_cast<size_t>(k)]);
-    // Of s(N / |N|) by N: what of the gradient is across N, over |N|.
+    // d s(N / |N|) / dN is the part of the gradient across N, over |N|.
     const Eigen::Vector3d j = l + (s.gradient - s.gradient.dot(unit) * unit) / length;
     const double r = samples.i(k, 3) - l.dot(n) - s.value;
-    const double w = samples.weights[k];
-    sums.chi_squared += w * r * r;
-    sums.information.noalias() += w * j * j.transpose();
-    sums.gradient += w * r * j;
+    sums.Add(j, r, samples.weights[k]);
   }
   return sums;
 }
 
-// (13) under each light.
+// Returns the s_k of (1).
 Eigen::VectorXd TermsAt(const LobeSamples& samples, const LobeShape& shape,
                         const Eigen::Vector3d& unit) {
   Eigen::VectorXd s(samples.l.rows());
@@ -61,7 +52,8 @@ Eigen::VectorXd TermsAt(const LobeSamples& samples, const LobeShape& shape,
   return s;
 }
 
-// 1 / variance of the luminance, (1) of its samples at what least squares N^0 predict.
+// Returns 1 / variance of the luminance of each sample, at the brightness that N^0 of least squares
+// predicts.
 Eigen::VectorXd LuminanceWeightsOf(const PixelSystem& system, const StackNoise& noise,
                                    const Eigen::Matrix<double, 3, 4>& n0) {
   const double length = n0.col(3).norm();
@@ -83,44 +75,33 @@ Eigen::VectorXd LuminanceWeightsOf(const PixelSystem& system, const StackNoise& 
   return weights;
 }
 
-// N where Gauss-Newton ends, and what the pixel is there.
+// N at which Gauss-Newton ends, and the pixel's sums there.
 struct LobeFit {
   Eigen::Vector3d n = Eigen::Vector3d::Zero();  // zero: no answer
-  Evaluation at{.chi_squared = std::numeric_limits<double>::infinity()};
+  double chi_squared = std::numeric_limits<double>::infinity();
+  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
   const LobeShape* shape = nullptr;
 };
 
-// (14)
+// Iterates (2) from `start`.
 LobeFit FitFrom(const Eigen::Vector3d& start, const LobeSamples& samples, const LobeShape& shape) {
-  LobeFit fit{.shape = &shape};
   if (!start.allFinite() || start.isZero()) {
-    return fit;
+    return {.shape = &shape};
   }
-  fit.n = start;
-  fit.at = EvaluateAt(samples, shape, start);
-  for (int step = 0; step < kLobeSteps; ++step) {
-    const double before = fit.at.chi_squared;
-    Eigen::Vector3d move = SolveSymmetric(fit.at.information, fit.at.gradient);
-    for (int half = 0; half <= kHalvings && move.allFinite(); ++half, move *= 0.5) {
-      const Evaluation next = EvaluateAt(samples, shape, fit.n + move);
-      if (next.chi_squared < before) {
-        fit.n += move;
-        fit.at = next;
-        break;
-      }
-    }
-    if (!(fit.at.chi_squared < (1.0 - kLobeConverged) * before)) {
-      break;
-    }
-  }
-  return fit;
+  const auto evaluate = [&](const Eigen::Vector3d& n) { return EvaluateAt(samples, shape, n); };
+  const auto move = [](const Eigen::Vector3d& n, const Eigen::Vector3d& step) -> Eigen::Vector3d {
+    return n + step;
+  };
+  const GaussNewtonFit<3, Eigen::Vector3d> fit =
+      MinimizeSquares<3>(start, evaluate, move, kLobeSteps);
+  return {fit.state, fit.equations.cost, fit.equations.information, &shape};
 }
 
 Eigen::Vector3d LeastSquares(const LobeSamples& samples, const LobeShape& /*shape*/) {
   return SolveNormalEquations(samples.l, Eigen::VectorXd(samples.i.col(3)));
 }
 
-// Least squares of the darker half of the samples, at least four.
+// Solves least squares of the darker half of the samples, at least four.
 Eigen::Vector3d DarkerHalf(const LobeSamples& samples, const LobeShape& /*shape*/) {
   std::vector<Eigen::Index> order(static_cast<size_t>(samples.l.rows()));
   std::iota(order.begin(), order.end(), 0);
@@ -131,7 +112,7 @@ Eigen::Vector3d DarkerHalf(const LobeSamples& samples, const LobeShape& /*shape*
   return SolveNormalEquations(l, i);
 }
 
-// The normal that mirrors the brightest lights, with the body that the samples leave to it.
+// Returns the normal that mirrors the brightest lights, times the albedo of the body under it.
 Eigen::Vector3d MirrorOfBrightest(const LobeSamples& samples, const LobeShape& shape) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   for (Eigen::Index k = 0; k < samples.l.rows(); ++k) {
@@ -145,17 +126,18 @@ Eigen::Vector3d MirrorOfBrightest(const LobeSamples& samples, const LobeShape& s
   return std::max(body, kLeastBody * cosines.dot(samples.i.col(3)) / squares) * unit;
 }
 
-// From the first of three starts that ends within the limit under one of the shapes, or the best of all.
+// Iterates from the three starts in turn until one of the shapes is within the limit. Returns the
+// best.
 LobeFit FitLobe(const LobeSamples& samples, std::span<const LobeShape> shapes) {
   const double limit = samples.limit * static_cast<double>(samples.l.rows() - 3);
   LobeFit fit;
   for (const auto& start : {LeastSquares, DarkerHalf, MirrorOfBrightest}) {
-    if (fit.at.chi_squared <= limit) {
+    if (fit.chi_squared <= limit) {
       break;
     }
     for (const LobeShape& shape : shapes) {
       const LobeFit other = FitFrom(start(samples, shape), samples, shape);
-      if (other.at.chi_squared < fit.at.chi_squared) {
+      if (other.chi_squared < fit.chi_squared) {
         fit = other;
       }
     }
@@ -200,8 +182,8 @@ LobeAnswer SolveLobe(const LobeSamples& samples, const Lobe& lobe) {
       FitLobe(samples, std::span(shapes).first(lobe.model == LobeModel::kGgxAnisotropic ? 2 : 1));
   LobeAnswer answer;
   const double length = fit.n.norm();
-  if (!std::isfinite(fit.at.chi_squared) || !(fit.n.dot(samples.v) > 0.0)) {
-    return answer;  // also where the surface would be turned away
+  if (!std::isfinite(fit.chi_squared) || !(fit.n.dot(samples.v) > 0.0)) {
+    return answer;  // where the surface would face away, too
   }
   answer.n = fit.n;
   const Eigen::Vector3d unit = fit.n / length;
@@ -213,8 +195,8 @@ LobeAnswer SolveLobe(const LobeSamples& samples, const Lobe& lobe) {
   }
   answer.lobe_share = cosines.dot(s) / squares / length;
   answer.residual = (i.col(3) - s - l * fit.n).norm() / std::sqrt(static_cast<double>(l.rows()));
-  answer.misfit = fit.at.chi_squared / static_cast<double>(l.rows() - 3);
-  const Eigen::Matrix3d covariance = fit.at.information.inverse();
+  answer.misfit = fit.chi_squared / static_cast<double>(l.rows() - 3);
+  const Eigen::Matrix3d covariance = fit.information.inverse();
   const double along = unit.dot(covariance * unit);
   answer.uncertainty_deg =
       std::sqrt(std::max(0.0, covariance.trace() - along)) / length * kDegPerRad;

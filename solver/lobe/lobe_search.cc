@@ -12,13 +12,13 @@
 namespace sateen {
 namespace {
 
-// A lobe is believed where it explains this share of the pixels that it is looked for on.
+// Smallest share of the pixels that a believed lobe explains.
 constexpr double kLobeExplains = 0.7;
-// ... and takes at least a fifth off their misfits: chance takes a twentieth.
+// Largest sum (1) under a believed lobe, relative to the sum without: chance takes a twentieth off.
 constexpr double kLobeImproves = 0.8;
-// On the grid, which may miss its best figures, a tenth.
+// Largest relative sum on the grid, which may miss the best parameters.
 constexpr double kCoarseImproves = 0.9;
-// What a pixel counts for at most.
+// Largest term of (1).
 constexpr double kMostOfAPixel = 20.0;
 constexpr std::array kAlphas = {0.15, 0.2, 0.3, 0.4, 0.5, 0.65, 0.8};
 constexpr std::array kStrengths = {0.35, 0.7, 1.4, 2.8};
@@ -32,16 +32,16 @@ constexpr double kMostGlossAlpha = 0.7;
 constexpr double kLeastStrength = 0.15;
 constexpr double kMostStrength = 3.0;
 constexpr size_t kFewestPixelsForLobe = 64;
-constexpr int kMostMoves = 12;  // at one size of steps
+constexpr int kMostMoves = 12;  // per step size
 constexpr int kShareSteps = 20;
 constexpr int kRefinements = 7;
-constexpr int kCoarseRefinements = 3;  // over as many pixels as on the grid
+constexpr int kCoarseRefinements = 3;  // over the pixels of the grid alone
 constexpr double kAlphaStep = 0.05;
 constexpr double kAzimuthStepDeg = 8.0;
-constexpr size_t kCoarseStep = 4;  // of the pixels, on the grid
+constexpr size_t kCoarseStep = 4;  // on the grid: every fourth pixel
 
-// Steps of the search; roughness and strength also together, because they make up for each other along a
-// narrow valley.
+// A step of the search. Some change roughness and strength together, because these compensate each
+// other along a narrow valley.
 struct LobeMove {
   int alpha = 0;
   int strength = 0;
@@ -63,9 +63,9 @@ constexpr std::array<LobeMove, 14> kLobeMoves = {{{1, 0},
                                                   {0, 0, 0, 1},
                                                   {0, 0, 0, -1}}};
 
-// (15) over every `step`th of the pixels, and how many are explained.
+// Sum (1) over every `step`th pixel, and the number of pixels explained.
 struct Score {
-  std::vector<double> misfits;  // over their limits
+  std::vector<double> misfits;  // relative to their limits
   double sum = 0.0;
   size_t explained = 0;
   size_t count = 0;
@@ -101,7 +101,7 @@ bool IsWithinBounds(const Lobe& lobe) {
          lobe.alpha < MostAlpha(lobe.model);
 }
 
-// The lobe changed by so many steps of its figures.
+// Returns the lobe with its parameters changed by steps.
 Lobe Moved(const Lobe& lobe, const LobeMove& by, double step) {
   Lobe moved = lobe;
   moved.alpha =
@@ -118,7 +118,8 @@ Lobe Moved(const Lobe& lobe, const LobeMove& by, double step) {
 
 const Score kWorst{.sum = std::numeric_limits<double>::infinity()};
 
-// The lobe of least sum: on a grid over some of the pixels, then half way to its neighbours over all, and so on.
+// Finds the lobe with the least sum: on a grid over some of the pixels, then in halving steps to
+// its neighbours over all of them.
 class LobeSearch {
  public:
   LobeSearch(const std::vector<LobeSamples>& pixels, int threads)
@@ -126,7 +127,7 @@ class LobeSearch {
 
   void Attempt(const Lobe& lobe) { Take(lobe, kCoarseStep); }
 
-  // False where what was attempted since the last call leads to no lobe that is believed.
+  // Returns false where the attempts since the last call lead to no lobe that is believed.
   bool Refine() {
     const Lobe nothing{.alpha = kAlphas.front(), .strength = 0.0};
     const double coarse = least_.sum;
@@ -157,8 +158,9 @@ class LobeSearch {
   }
 
  private:
-  // The share of the pixels that have the lobe, by expectation and maximisation: each has it by the odds of
-  // the two likelihoods and of that share. Pixels that neither explains say nothing.
+  // Returns the share of the pixels that have the lobe, by expectation maximisation: each pixel has
+  // it with the probability (3) of solver/lobe/lobe.h. Pixels that neither answer explains do not
+  // count.
   [[nodiscard]] double ShareOf(const std::vector<double>& with,
                                const std::vector<double>& without) const {
     double share = 0.5;
@@ -250,10 +252,10 @@ std::optional<Lobe> SearchLobe(const std::vector<LobeSamples>& pixels, int threa
   return search.Best();
 }
 
-std::optional<Lobe> FindLobe(const LightStack& stack, const Rig& rig,
-                             const LambertianOptions& options, const StackNoise& noise,
-                             double scale_squared, const MisfitSample& sample,
-                             const std::array<float, 256>& limit, int threads) {
+std::optional<Lobe> FindLobe(const FramesInput& input, const LambertianOptions& options,
+                             const StackNoise& noise, double scale_squared,
+                             const MisfitSample& sample, const std::array<float, 256>& limit,
+                             int threads) {
   if (LeastSquaresExplain(sample, limit) || !std::isfinite(scale_squared)) {
     return std::nullopt;
   }
@@ -263,15 +265,15 @@ std::optional<Lobe> FindLobe(const LightStack& stack, const Rig& rig,
       fit_for_it.push_back(j);
     }
   }
-  const auto width = static_cast<size_t>(stack[0].rgb[0].width);
-  PixelSystem system(stack, rig, options);
+  const auto width = static_cast<size_t>(input.stack[0].rgb[0].width);
+  PixelSystem system(input, options);
   std::vector<LobeSamples> pixels;
   const size_t step = std::max<size_t>(1, fit_for_it.size() / kLobePixels);
   for (size_t at = 0; at < fit_for_it.size(); at += step) {
     const size_t j = fit_for_it[at];
     const auto column = static_cast<int>(sample.pixels[j] % width);
     const auto row = static_cast<int>(sample.pixels[j] / width);
-    if (const std::optional<Eigen::Vector3d> v = ViewOf(rig, column, row)) {
+    if (const std::optional<Eigen::Vector3d> v = ViewOf(input.rig, column, row)) {
       system.Gather(column, row);
       pixels.push_back(LobeSamplesOf(system, noise, scale_squared, *v,
                                      static_cast<double>(limit[sample.samples[j]])));

@@ -8,23 +8,33 @@
 #include "solver/lobe/lobe.h"
 #include "solver/noise.h"
 
+/// Search for the lobe of a scene, by the misfits of some 400 pixels under it:
+///
+///     a, alpha = argmin sum over the pixels of min(log(1 + misfit / limit), 20)               (1)
+///
+/// over fuzz and gloss, and over gloss of yarns where neither of them is believed. A lobe is
+/// believed where all of this holds:
+///
+///   * it explains 70 % of the pixels;
+///   * it halves the number of pixels that least squares leave unexplained;
+///   * it reduces (1) by a fifth;
+///   * cloth can have it: a strength of 0.15 to 3, a roughness up to 0.7, for fuzz up to 0.85.
+///     Stray light and interreflection look like a rougher and stronger lobe.
 namespace sateen {
 
-// Equation (15) over these pixels, and which share of them has the lobe. Nothing where they are fewer
-// than 64; where no lobe explains 70 of 100, halves what least squares leave unexplained and takes a
-// fifth off (15); or where the best is beyond what cloth has: a strength of 0.15 to 3, a roughness up
-// to 0.7, of fuzz 0.85. Stray light and bounces look like a rougher and stronger lobe.
-[[nodiscard]] std::optional<Lobe> SearchLobe(const std::vector<LobeSamples>& pixels, int threads);
-
-// Pixels that SearchLobe() is to be given, and the share that rung 1 has to explain so that no lobe is looked
-// for.
+// Number of pixels to give to SearchLobe().
 inline constexpr size_t kLobePixels = 384;
+// Share of pixels explained by rung 1 from which no lobe is looked for.
 inline constexpr double kWellExplained = 0.8;
 
-// The lobe that explains a sample of pixels of which plain least squares leave many unexplained;
-// nothing where none does, or where there is no camera to say from where the surface is seen. A pixel
-// is explained where its misfit is at most limit[its usable samples].
-[[nodiscard]] std::optional<Lobe> FindLobe(const LightStack& stack, const Rig& rig,
+// Minimises (1) over these pixels and measures the share of them with the lobe. Returns nothing
+// where no lobe is believed, or for fewer than 64 pixels. Takes 0.1 to 3 s.
+[[nodiscard]] std::optional<Lobe> SearchLobe(const std::vector<LobeSamples>& pixels, int threads);
+
+// Searches the sampled pixels, where rung 1 explains too few of them. `limit` holds the largest
+// misfit of an explained pixel, by its usable samples. Returns nothing without a camera that tells
+// from where the surface is seen.
+[[nodiscard]] std::optional<Lobe> FindLobe(const FramesInput& input,
                                            const LambertianOptions& options,
                                            const StackNoise& noise, double scale_squared,
                                            const MisfitSample& sample,

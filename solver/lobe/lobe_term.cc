@@ -2,7 +2,6 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <numbers>
 
@@ -13,17 +12,16 @@ namespace {
 
 constexpr double kLobeF0 = 0.04;
 constexpr double kLeastViewCosine = 1e-4;    // as reflectance/specular.h has it
-constexpr double kLeastSineSquared = 1e-4;   // of n and h, below which velvet is flat
-constexpr double kLeastTangentPart = 1e-12;  // squared, of the tangent in the surface
-constexpr std::array<std::string_view, 3> kLobeNames = {"cloth", "ggx", "ggx-anisotropic"};
+constexpr double kLeastSineSquared = 1e-4;   // between n and h; below it velvet is flat
+constexpr double kLeastTangentPart = 1e-12;  // squared length of the tangent in the surface
 
-// A factor of the lobe and its derivative.
+// Factor of the lobe and its derivative.
 struct Factor {
   double value;
   double slope;
 };
 
-// reflectance/microfacet.h's VelvetDistribution in n . h.
+// Returns VelvetDistribution of reflectance/microfacet.h as a function of n . h.
 Factor VelvetOf(double n_h, double alpha) {
   const double unit = 1.0 / (std::numbers::pi * (1.0 + 4.0 * alpha * alpha));
   const double q = 1.0 - n_h * n_h;
@@ -35,7 +33,7 @@ Factor VelvetOf(double n_h, double alpha) {
           unit * 4.0 * e * (4.0 * n_h / q - 2.0 * n_h / (alpha * alpha * q * q))};
 }
 
-// x + sqrt(x^2 + alpha^2 (1 - x^2)): Smith's masking is 2 x over this.
+// Returns x + sqrt(x^2 + alpha^2 (1 - x^2)). Smith's masking is 2 x over this.
 Factor SmithOf(double x, double alpha) {
   const double a = alpha * alpha;
   const double root = std::sqrt(x * x * (1.0 - a) + a);
@@ -43,8 +41,6 @@ Factor SmithOf(double x, double alpha) {
 }
 
 }  // namespace
-
-std::string_view Name(LobeModel model) { return kLobeNames[static_cast<size_t>(model)]; }
 
 LobeHalf LobeHalfOf(const Eigen::Vector3d& l, const Eigen::Vector3d& v) {
   const Eigen::Vector3d h = (l + v).normalized();

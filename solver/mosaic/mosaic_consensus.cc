@@ -1,29 +1,36 @@
-// Rung 2 of the sites of a MosaicFeed.
+#include "solver/mosaic/mosaic_consensus.h"
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
 #include "core/angle.h"
-#include "solver/kernels/consensus.h"
-#include "solver/mosaic/mosaic_feed.h"
+#include "solver/robust/consensus.h"
 
 namespace sateen {
 namespace {
 
-// The search in interpolated colours, which have their own errors at edges, counts where its samples
-// spread less than this part of the own colour's: highlights that the colour of a cloth has no part in.
+// Largest spread of the samples in interpolated colours, relative to that in the own colour, at
+// which they are taken: they have their own errors at edges.
 constexpr float kColourAdvantage = 0.5F;
 
-// What the search knows of the spread of its samples, in degrees (solver/ladder.h, (11)).
+// Returns the spread of the samples in degrees, from (6) of solver/robust/consensus.h.
 float SpreadOf(float uncertainty_deg) {
   constexpr auto kLeastDeg = kLeastModelUncertainty * static_cast<float>(kDegPerRad);
   return std::sqrt(std::max(0.0F, uncertainty_deg * uncertainty_deg - kLeastDeg * kLeastDeg));
 }
 
+// Returns the search's light. Flux and saturation are already taken out of its samples.
+KernelLight ConsensusLightOf(const MosaicKernelLight& light) {
+  return {.lamp = light.lamp,
+          .inverse_flux = {1.0F, 1.0F, 1.0F},
+          .clip = std::numeric_limits<float>::infinity()};
+}
+
 }  // namespace
 
-// Answers of the search, one entry a site.
-struct MosaicFeed::Consensus {
+// Answers of the search, one entry per site.
+struct MosaicConsensus::Answers {
   std::vector<float> results;  // normal, albedo of each colour, residual, both uncertainties
   std::vector<uint8_t> bytes;  // samples, reason, agreeing
   size_t count = 0;
@@ -37,27 +44,35 @@ struct MosaicFeed::Consensus {
   [[nodiscard]] float Spread(size_t j) const { return SpreadOf(results[7 * count + j]); }
 };
 
-float MosaicFeed::SampleAt(const MosaicPiece& piece, size_t frame, int x, int y) const {
+MosaicConsensus::MosaicConsensus(const MosaicStack& stack, const MosaicKernelParams& params)
+    : stack_(&stack),
+      mosaic_(&params),
+      params_{.result_scale = params.result_scale,
+              .shadow_level = params.shadow_level,
+              .max_condition_squared = params.max_condition_squared} {
+  for (const MosaicKernelLight& light : params.lights) {
+    params_.lights.push_back(ConsensusLightOf(light));
+  }
+}
+
+float MosaicConsensus::SampleAt(const MosaicPiece& piece, size_t frame, int x, int y) const {
   const size_t site = static_cast<size_t>(y % 2 * 2 + x % 2);
-  const size_t at =
-      static_cast<size_t>(stack_->size_px.width) * static_cast<size_t>(y - piece.read_begin_) +
-      static_cast<size_t>(x);
-  const MosaicKernelLight& light = params_.lights[frame];
-  const auto reading = static_cast<float>(piece.readings_[frame][at]);
-  const float dark = piece.dark_.empty() ? 0.0F : piece.dark_[at];
+  const MosaicKernelLight& light = mosaic_->lights[frame];
+  const auto reading = static_cast<float>(piece.ReadingAt(frame, x, y));
+  const float dark = piece.DarkAt(x, y);
   return reading >= light.clip_dn
              ? std::numeric_limits<float>::quiet_NaN()
              : light.per_dn[site] * reading + light.at_zero[site] - light.inverse_flux[site] * dark;
 }
 
-float MosaicFeed::ColourAt(const MosaicPiece& piece, size_t frame, int x, int y,
-                           size_t colour) const {
+float MosaicConsensus::ColourAt(const MosaicPiece& piece, size_t frame, int x, int y,
+                                size_t colour) const {
   if (stack_->cfa[static_cast<size_t>(y % 2 * 2 + x % 2)] == colour) {
     return SampleAt(piece, frame, x, y);
   }
   float sum = 0.0F;
   float count = 0.0F;
-  for (int v = std::max(y - 1, piece.read_begin_); v <= std::min(y + 1, piece.read_end_ - 1); ++v) {
+  for (int v = std::max(y - 1, piece.ReadBegin()); v <= std::min(y + 1, piece.ReadEnd() - 1); ++v) {
     for (int u = std::max(x - 1, 0); u <= std::min(x + 1, stack_->size_px.width - 1); ++u) {
       if (stack_->cfa[static_cast<size_t>(v % 2 * 2 + u % 2)] == colour) {
         sum += SampleAt(piece, frame, u, v);
@@ -68,14 +83,15 @@ float MosaicFeed::ColourAt(const MosaicPiece& piece, size_t frame, int x, int y,
   return sum / count;
 }
 
-MosaicFeed::Consensus MosaicFeed::Search(const MosaicPiece& piece, std::span<const size_t> sites,
-                                         bool coloured) const {
+MosaicConsensus::Answers MosaicConsensus::Search(const MosaicPiece& piece,
+                                                 std::span<const size_t> sites,
+                                                 bool coloured) const {
   const size_t count = sites.size();
   const size_t frames = stack_->lit.size();
   const auto width = static_cast<size_t>(stack_->size_px.width);
   const size_t colours = coloured ? 3 : 1;
-  const PixelGeometry& geometry = piece.geometry_;
-  // Side by side, so that every lane of a vector has work.
+  const PixelGeometry& geometry = piece.Geometry();
+  // Samples stand side by side, so that every lane of a vector has work.
   std::vector<float> gathered(((colours + 1) * frames + 3) * count, 0.0F);
   size_t next = 0;
   const auto column = [&](const auto& value) {
@@ -92,7 +108,7 @@ MosaicFeed::Consensus MosaicFeed::Search(const MosaicPiece& piece, std::span<con
     for (size_t c = 0; c < colours; ++c) {
       planes.push_back(column([&](size_t at) {
         const int x = static_cast<int>(at % width);
-        const int y = piece.begin_ + static_cast<int>(at / width);
+        const int y = piece.Begin() + static_cast<int>(at / width);
         return coloured ? ColourAt(piece, k, x, y, c) : SampleAt(piece, k, x, y);
       }));
     }
@@ -107,10 +123,10 @@ MosaicFeed::Consensus MosaicFeed::Search(const MosaicPiece& piece, std::span<con
   const float* const x_mm = coordinate(geometry.x_mm);
   const float* const y_mm = coordinate(geometry.y_mm);
   const float* const z_mm = coordinate(geometry.z_mm);
-  Consensus found{.results = std::vector<float>(9 * count),
-                  .bytes = std::vector<uint8_t>(3 * count),
-                  .count = count};
-  SolveConsensusSpan(consensus_,
+  Answers found{.results = std::vector<float>(9 * count),
+                .bytes = std::vector<uint8_t>(3 * count),
+                .count = count};
+  SolveConsensusSpan(params_,
                      {.planes = planes.data(),
                       .x_mm = x_mm,
                       .y_mm = y_mm,
@@ -128,15 +144,15 @@ MosaicFeed::Consensus MosaicFeed::Search(const MosaicPiece& piece, std::span<con
   return found;
 }
 
-void MosaicFeed::SolveConsensus(const MosaicPiece& piece, std::span<const size_t> sites,
-                                SiteRows& rows, std::span<uint8_t> agreeing) const {
-  const size_t shift = rows.Index(piece.begin_);
+void MosaicConsensus::Solve(const MosaicPiece& piece, std::span<const size_t> sites, SiteRows& rows,
+                            std::span<uint8_t> agreeing) const {
+  const size_t shift = rows.Index(piece.Begin());
   std::vector<size_t> of_piece(sites.begin(), sites.end());
   for (size_t& site : of_piece) {
     site -= shift;
   }
-  Consensus own = Search(piece, of_piece, false);
-  Consensus colours = Search(piece, of_piece, true);
+  Answers own = Search(piece, of_piece, false);
+  Answers colours = Search(piece, of_piece, true);
   const auto width = static_cast<size_t>(stack_->size_px.width);
   NormalField& field = rows.Field();
   for (size_t j = 0; j < sites.size(); ++j) {
@@ -144,7 +160,7 @@ void MosaicFeed::SolveConsensus(const MosaicPiece& piece, std::span<const size_t
         colours.IsSolved(j) &&
         (!own.IsSolved(j) || (colours.Agreeing(j) >= own.Agreeing(j) &&
                               colours.Spread(j) < kColourAdvantage * own.Spread(j)));
-    Consensus& found = is_coloured ? colours : own;
+    Answers& found = is_coloured ? colours : own;
     agreeing[j] = found.IsSolved(j) ? found.Agreeing(j) : uint8_t{0};
     if (!found.IsSolved(j)) {
       continue;
@@ -153,7 +169,7 @@ void MosaicFeed::SolveConsensus(const MosaicPiece& piece, std::span<const size_t
       field.normal[c].pixels[sites[j]] = found.Result(c)[j];
     }
     const size_t x = of_piece[j] % width;
-    const size_t y = static_cast<size_t>(piece.begin_) + of_piece[j] / width;
+    const size_t y = static_cast<size_t>(piece.Begin()) + of_piece[j] / width;
     rows.OwnColour(sites[j]) = found.Result(3 + stack_->cfa[y % 2 * 2 + x % 2])[j];
     field.residual.pixels[sites[j]] = found.Result(6)[j];
     field.uncertainty.pixels[sites[j]] = found.Result(7)[j];

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 #include "solver/least_squares/fast_rows.h"
@@ -13,7 +12,8 @@ namespace {
 
 constexpr size_t kRowsLookedAt = 32;
 
-// Variance of a white diffuser's i' under light 0, so that float holds weights in any units.
+// Returns the variance of a white diffuser's i' under light 0: in it, float holds weights in any
+// units.
 double NoiseUnit(const MosaicStack& stack, const Light& light, double flux_scale) {
   const SiteNoise noise = NoiseAt(stack, 0, 0);
   const double f = flux_scale / TypicalIrradiance(light);
@@ -25,14 +25,8 @@ MosaicKernelLight KernelLightOf(const MosaicStack& stack, size_t k, const Light&
                                 double flux_scale, double noise_unit,
                                 const LambertianOptions& options) {
   const bool is_distant = light.model == LightModel::kDistant;
-  const Eigen::Vector3f place = (is_distant ? light.direction : light.position_mm).cast<float>();
-  const Eigen::Vector3f axis = light.axis.cast<float>();
   const MosaicFrame& frame = stack.lit[k];
-  MosaicKernelLight of{.model = light.model,
-                       .place = {place.x(), place.y(), place.z()},
-                       .axis = {axis.x(), axis.y(), axis.z()},
-                       .anisotropy = static_cast<float>(light.anisotropy),
-                       .clip_dn = ClipThreshold(frame, options)};
+  MosaicKernelLight of{.lamp = KernelLampOf(light), .clip_dn = ClipThreshold(frame, options)};
   for (size_t site = 0; site < 4; ++site) {
     const double flux = light.flux_rgb[stack.cfa[site]] * (is_distant ? 1.0 : 1e6) / flux_scale;
     const SiteNoise noise = NoiseAt(stack, k, site);
@@ -46,65 +40,47 @@ MosaicKernelLight KernelLightOf(const MosaicStack& stack, size_t k, const Light&
   return of;
 }
 
-// The search's light: its samples come with flux and saturation taken out of them.
-KernelLight ConsensusLightOf(const MosaicKernelLight& light) {
-  return {.model = light.model,
-          .place = light.place,
-          .axis = light.axis,
-          .anisotropy = light.anisotropy,
-          .inverse_flux = {1.0F, 1.0F, 1.0F},
-          .clip = std::numeric_limits<float>::infinity()};
-}
-
 }  // namespace
 
-void SiteRows::Begin(int begin, int end, NormalField& field, int field_row, bool with_ladder) {
-  field_ = &field;
-  field_row_ = field_row;
-  first_ = Index(begin);
-  own_colour_.resize(Index(end) - first_);
-  misfit_.resize(with_ladder ? own_colour_.size() : 0);
-}
-
-Result<MosaicFeed> MosaicFeed::Make(const MosaicStack& stack, const Rig& rig,
-                                    const LambertianOptions& options, bool weighted) {
-  Result<PixelLocator> locator = PixelLocator::Make(rig, options.height_mm);
+Result<MosaicFeed> MosaicFeed::Make(const MosaicInput& input, const LambertianOptions& options,
+                                    bool weighted) {
+  const MosaicStack& stack = input.stack;
+  const Lights& lights = input.rig.lights;
+  Result<PixelLocator> locator = PixelLocator::Make(input.rig, input.height_mm);
   if (!locator) {
     return tl::unexpected(locator.error());
   }
   MosaicFeed feed(stack, *std::move(locator));
-  const double flux_scale = FluxScale(rig.lights);
-  const double noise_unit = weighted ? NoiseUnit(stack, rig.lights[0], flux_scale) : 1.0;
+  const double flux_scale = FluxScale(lights);
+  const double noise_unit = weighted ? NoiseUnit(stack, lights[0], flux_scale) : 1.0;
   feed.params_.result_scale = static_cast<float>(1.0 / flux_scale);
   feed.params_.shadow_level = static_cast<float>(options.shadow_level);
   feed.params_.max_condition_squared = std::min(
       static_cast<float>(options.max_condition * options.max_condition), kFloatConditionSquared);
   feed.params_.weighted = weighted;
   feed.params_.noise_unit = static_cast<float>(noise_unit);
-  feed.consensus_.result_scale = feed.params_.result_scale;
-  feed.consensus_.shadow_level = feed.params_.shadow_level;
-  feed.consensus_.max_condition_squared = feed.params_.max_condition_squared;
-  for (size_t k = 0; k < rig.lights.size(); ++k) {
+  for (size_t k = 0; k < lights.size(); ++k) {
     feed.params_.lights.push_back(
-        KernelLightOf(stack, k, rig.lights[k], flux_scale, noise_unit, options));
-    feed.consensus_.lights.push_back(ConsensusLightOf(feed.params_.lights.back()));
+        KernelLightOf(stack, k, lights[k], flux_scale, noise_unit, options));
   }
   return feed;
 }
 
-std::vector<int> RowsLookedAt(const MosaicStack& stack, const Mask* mask) {
+std::vector<int> RowsLookedAt(const MosaicInput& input) {
+  const ImageSize size = input.stack.size_px;
+  const Mask* const mask = input.mask;
   std::vector<int> inside;
-  for (int row = 0; row < stack.size_px.height; ++row) {
+  for (int row = 0; row < size.height; ++row) {
     const uint8_t* const of_row =
         mask == nullptr ? nullptr : mask->pixels.data() + mask->Index(0, row);
-    if (mask == nullptr || std::any_of(of_row, of_row + stack.size_px.width,
-                                       [](uint8_t value) { return value != 0; })) {
+    if (mask == nullptr ||
+        std::any_of(of_row, of_row + size.width, [](uint8_t value) { return value != 0; })) {
       inside.push_back(row);
     }
   }
   std::vector<int> rows(std::min(kRowsLookedAt, inside.size()));
   for (size_t j = 0; j < rows.size(); ++j) {
-    // Of both parities, which have other colours.
+    // Takes both parities in turn, which have other colours.
     const size_t at = (2 * j + 1) * inside.size() / (2 * rows.size());
     rows[j] = inside[std::min(at / 2 * 2 + j % 2, inside.size() - 1)];
   }
@@ -116,23 +92,9 @@ Error CannotReadBack(const MosaicStack& stack) {
           fmt::format("{}: rows of the mosaics cannot be read back", stack.lit[0].name)};
 }
 
-MosaicPiece PiecePool::Take() {
-  const std::lock_guard lock(mutex_);
-  if (idle_.empty()) {
-    return {};
-  }
-  MosaicPiece piece = std::move(idle_.back());
-  idle_.pop_back();
-  return piece;
-}
-
-void PiecePool::Give(MosaicPiece piece) {
-  const std::lock_guard lock(mutex_);
-  idle_.push_back(std::move(piece));
-}
-
 void MosaicFeed::Read(int begin, int end, MosaicPiece& piece) const {
   piece.is_read_ = true;
+  piece.width_ = static_cast<size_t>(stack_->size_px.width);
   piece.begin_ = begin;
   piece.end_ = end;
   piece.read_begin_ = std::max(0, begin - 1);
@@ -223,10 +185,6 @@ void MosaicFeed::Run(RowFunction function, const MosaicPiece& piece, const Mask*
 
 void MosaicFeed::Solve(const MosaicPiece& piece, const Mask* mask, SiteRows& rows) const {
   Run(SolveMosaicRow, piece, mask, rows);
-}
-
-void MosaicFeed::Touch(const MosaicPiece& piece, SiteRows& rows) const {
-  Run(TouchMosaicRow, piece, nullptr, rows);
 }
 
 }  // namespace sateen

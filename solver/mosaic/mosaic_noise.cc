@@ -8,19 +8,21 @@
 #include <vector>
 
 #include "core/parallel.h"
+#include "core/statistics.h"
 #include "solver/mosaic/mosaic_feed.h"
 #include "solver/noise.h"
 
 namespace sateen {
 namespace {
 
-// Only the best sites tell of the noise, because of a shiny sample most of them tell of the shine.
+// Quantiles that show the noise: on a shiny scene most sites show the shine.
 constexpr double kBestMisfits = 0.05;
 constexpr double kBestBends = 0.25;
-// Below this share of its saturation a reading is mostly rounding and read noise.
+// Smallest signal that counts, relative to saturation; below it rounding and read noise dominate.
 constexpr float kLeastSignal = 0.01F;
-constexpr size_t kFewestReadings = 4;  // that leave a residual
+constexpr size_t kFewestReadings = 4;  // to leave a residual
 
+// Noise as one row shows it.
 struct RowTells {
   bool is_read = true;
   std::array<std::vector<float>, 256> misfits;  // by usable readings
@@ -28,7 +30,7 @@ struct RowTells {
   double excess = 0.0;                          // sum of (b^2 - 6/12) / 6 signal
 };
 
-// (3) of one row and frame.
+// Adds the terms of (3) of one row and frame.
 void AddBends(const MosaicFrame& frame, const MosaicPiece& piece, size_t k,
               const NormalField& field, RowTells& tells) {
   const size_t width = field.reason.pixels.size();
@@ -52,8 +54,7 @@ void AddBends(const MosaicFrame& frame, const MosaicPiece& piece, size_t k,
   }
 }
 
-RowTells LookAtRow(const MosaicStack& stack, const MosaicFeed& feed,
-                   const std::optional<Mask>& mask, int row) {
+RowTells LookAtRow(const MosaicInput& input, const MosaicFeed& feed, int row) {
   RowTells tells;
   MosaicPiece piece;
   feed.Read(row, row + 1, piece);
@@ -62,31 +63,29 @@ RowTells LookAtRow(const MosaicStack& stack, const MosaicFeed& feed,
     return tells;
   }
   NormalField field;
-  field.Resize({stack.size_px.width, 1});
-  field.uncertainty = Image<float>(field.reason.Size());
-  field.albedo_uncertainty = Image<float>(field.reason.Size());
+  field.Resize({input.stack.size_px.width, 1}, /*with_ladder=*/true);
   SiteRows rows;
   rows.Begin(row, row + 1, field, row, /*with_ladder=*/true);
-  feed.Solve(piece, mask ? &*mask : nullptr, rows);
+  feed.Solve(piece, input.mask, rows);
   for (size_t x = 0; x < field.reason.pixels.size(); ++x) {
     if (IsSolved(field, x)) {
       tells.misfits[field.samples.pixels[x]].push_back(rows.Misfit(x));
     }
   }
-  for (size_t k = 0; k < stack.lit.size(); ++k) {
-    AddBends(stack.lit[k], piece, k, field, tells);
+  for (size_t k = 0; k < input.stack.lit.size(); ++k) {
+    AddBends(input.stack.lit[k], piece, k, field, tells);
   }
   return tells;
 }
 
-double GainOf(std::vector<float>& values, double share, int freedom) {
+double GainOf(const std::vector<float>& values, double share, int freedom) {
   if (values.empty()) {
     return std::numeric_limits<double>::infinity();
   }
-  return static_cast<double>(QuantileOf(values, share)) / ReducedChiSquaredQuantile(share, freedom);
+  return static_cast<double>(Quantile(values, share)) / ReducedChiSquaredQuantile(share, freedom);
 }
 
-// (1)
+// Returns (1).
 double GainOfRows(std::vector<RowTells>& rows) {
   RowTells all;
   for (const RowTells& row : rows) {
@@ -108,31 +107,31 @@ double GainOfRows(std::vector<RowTells>& rows) {
 
 }  // namespace
 
-Result<double> MeasureGain(const MosaicStack& stack, const Rig& rig,
-                           const std::optional<Mask>& mask, const LambertianOptions& options,
+Result<double> MeasureGain(const MosaicInput& input, const LambertianOptions& options,
                            const Task& task) {
-  MosaicStack unit = stack;
+  MosaicStack unit = input.stack;
   for (MosaicFrame& frame : unit.lit) {
     frame.gain_dn = 1.0;
     frame.read_dn = kRoundingDn;
   }
-  const Result<MosaicFeed> feed = MosaicFeed::Make(unit, rig, options, /*weighted=*/true);
+  const MosaicInput with_unit = input.With(unit);
+  const Result<MosaicFeed> feed = MosaicFeed::Make(with_unit, options, /*weighted=*/true);
   if (!feed) {
     return tl::unexpected(feed.error());
   }
-  const std::vector<int> places = RowsLookedAt(stack, mask ? &*mask : nullptr);
+  const std::vector<int> places = RowsLookedAt(input);
   std::vector<RowTells> rows(places.size());
   const Task silent{.threads = task.threads, .progress = nullptr, .cancel = task.cancel};
   const Status looked =
       ParallelFor(static_cast<int>(places.size()), 1, silent, [&](int j, int /*end*/) {
         const auto at = static_cast<size_t>(j);
-        rows[at] = LookAtRow(unit, *feed, mask, places[at]);
+        rows[at] = LookAtRow(with_unit, *feed, places[at]);
       });
   if (!looked) {
     return tl::unexpected(looked.error());
   }
   if (!std::ranges::all_of(rows, &RowTells::is_read)) {
-    return tl::unexpected(CannotReadBack(stack));
+    return tl::unexpected(CannotReadBack(input.stack));
   }
   return GainOfRows(rows);
 }

@@ -6,24 +6,23 @@
 #include <utility>
 #include <vector>
 
-#include "solver/kernels/consensus.h"
 #include "solver/least_squares/least_squares.h"
 #include "solver/mosaic/mosaic_site.h"
 
 namespace sateen {
 namespace {
 
-// Sites that the kernel refused, or all, one by one in double.
+// Solves the sites that the kernel refused, or all, in double. Returns their number.
 int64_t SolveInDouble(const MosaicJob& job, const MosaicPiece& piece, bool all, SiteRows& rows) {
-  MosaicSite site(job.stack, job.rig, job.options.least_squares, job.options.mode.has_value());
-  const auto width = static_cast<size_t>(job.stack.size_px.width);
-  std::vector<uint16_t> readings(job.stack.lit.size());
+  MosaicSite site(job.input, job.options.least_squares, job.options.mode.has_value());
+  const auto width = static_cast<size_t>(job.input.stack.size_px.width);
+  std::vector<uint16_t> readings(job.input.stack.lit.size());
   int64_t solved = 0;
   NormalField& field = rows.Field();
   for (int row = piece.Begin(); row < piece.End(); ++row) {
-    for (int column = 0; column < job.stack.size_px.width; ++column) {
+    for (int column = 0; column < job.input.stack.size_px.width; ++column) {
       const size_t p = rows.Index(row) + static_cast<size_t>(column);
-      const bool inside = job.mask == nullptr || job.mask->At(column, row) != 0;
+      const bool inside = job.input.mask == nullptr || job.input.mask->At(column, row) != 0;
       if (!inside ||
           !(all || field.reason.pixels[p] == static_cast<uint8_t>(Reason::kIllConditioned))) {
         continue;
@@ -66,19 +65,19 @@ bool MustClimb(const MosaicJob& job, SiteRows& rows, size_t p) {
   }
   return rows.Misfit(p) > job.limit[samples] &&
          rows.Field().residual.pixels[p] >
-             static_cast<float>(job.options.explained_residual) * rows.OwnColour(p);
+             static_cast<float>(job.options.climb.explained_residual) * rows.OwnColour(p);
 }
 
-// Rung 3: for those sites that the scene's lobe explains.
+// Gives rung 3 to the sites that the scene's lobe explains.
 void SolveSitesUnderLobe(const MosaicJob& job, const MosaicPiece& piece, SiteRows& rows,
                          PieceSummary& summary) {
-  MosaicSite site(job.stack, job.rig, job.options.least_squares, true);
+  MosaicSite site(job.input, job.options.least_squares, true);
   NormalField& field = rows.Field();
   for (int row = piece.Begin(); row < piece.End(); ++row) {
-    for (int column = 0; column < job.stack.size_px.width; ++column) {
+    for (int column = 0; column < job.input.stack.size_px.width; ++column) {
       const size_t p = rows.Index(row) + static_cast<size_t>(column);
       const std::optional<Eigen::Vector3d> v =
-          IsSolved(field, p) ? ViewOf(job.rig, column, row) : std::nullopt;
+          IsSolved(field, p) ? ViewOf(job.input.rig, column, row) : std::nullopt;
       if (!v) {
         continue;
       }
@@ -101,8 +100,8 @@ void SolveSitesUnderLobe(const MosaicJob& job, const MosaicPiece& piece, SiteRow
   }
 }
 
-// Rung 1's word on the piece's sites, rung 3's where the scene has a lobe, then rung 2's on those that
-// climb.
+// Judges rung 1 on the piece's sites, tries rung 3 where the scene has a lobe, then solves the
+// sites that climb on rung 2.
 void ClimbSites(const MosaicJob& job, const MosaicPiece& piece, SiteRows& rows,
                 PieceSummary& summary) {
   NormalField& field = rows.Field();
@@ -147,26 +146,15 @@ void ClimbSites(const MosaicJob& job, const MosaicPiece& piece, SiteRows& rows,
       const auto albedo = [&](size_t p) { return rows.OwnColour(p); };
       const std::vector<Estimate> before = EstimatesAt(field, sites, albedo);
       std::vector<uint8_t> agreeing(sites.size());
-      job.feed.SolveConsensus(piece, sites, rows, agreeing);
+      job.consensus.Solve(piece, sites, rows, agreeing);
       JudgeConsensus(sites, before, EstimatesAt(field, sites, albedo), agreeing, field, summary);
     });
   }
 }
 
-int64_t CountSitesOf(Reason reason, const MosaicPiece& piece, const SiteRows& rows) {
+std::span<const uint8_t> ReasonsOf(const MosaicPiece& piece, const SiteRows& rows) {
   const size_t begin = rows.Index(piece.Begin());
-  return CountOf(
-      static_cast<uint8_t>(reason),
-      std::span(rows.Field().reason.pixels).subspan(begin, rows.Index(piece.End()) - begin));
-}
-
-void CountSites(const MosaicPiece& piece, const SiteRows& rows, SolveSummary& counts) {
-  const auto count = [&](Reason reason) { return CountSitesOf(reason, piece, rows); };
-  counts.solved += count(Reason::kSolved);
-  counts.dark += count(Reason::kDark);
-  counts.too_few_samples += count(Reason::kTooFewSamples);
-  counts.saturated += count(Reason::kSaturated);
-  counts.ill_conditioned += count(Reason::kIllConditioned);
+  return std::span(rows.Field().reason.pixels).subspan(begin, rows.Index(piece.End()) - begin);
 }
 
 }  // namespace
@@ -179,17 +167,31 @@ bool SolvePiece(const MosaicJob& job, int begin, int end, SiteRows& rows, PieceS
   }
   const Backend backend = job.options.least_squares.backend;
   const bool in_double = backend != Backend::kFast && backend != Backend::kAuto;
-  job.feed.Solve(piece, job.mask, rows);
+  job.feed.Solve(piece, job.input.mask, rows);
   if (in_double ||
-      (backend == Backend::kAuto && CountSitesOf(Reason::kIllConditioned, piece, rows) > 0)) {
+      (backend == Backend::kAuto &&
+       CountOf(static_cast<uint8_t>(Reason::kIllConditioned), ReasonsOf(piece, rows)) > 0)) {
     const int64_t solved = SolveInDouble(job, piece, in_double, rows);
     summary.counts.resolved_by_reference += in_double ? 0 : solved;
   }
   if (job.options.mode) {
     ClimbSites(job, piece, rows, summary);
   }
-  CountSites(piece, rows, summary.counts);
+  CountReasons(ReasonsOf(piece, rows), summary.counts);
   job.pieces.Give(std::move(piece));
+  return true;
+}
+
+bool SolveRowAlone(const MosaicJob& job, int row, PieceSummary& summary, std::vector<float>& own) {
+  NormalField field;
+  SiteRows rows;
+  const int width = job.input.stack.size_px.width;
+  field.Resize({width, 1}, job.options.mode.has_value());
+  rows.Begin(row, row + 1, field, row, job.options.mode.has_value());
+  if (!SolvePiece(job, row, row + 1, rows, summary)) {
+    return false;
+  }
+  own.assign(&rows.OwnColour(0), &rows.OwnColour(0) + width);
   return true;
 }
 

@@ -6,7 +6,7 @@
 
 #include "core/angle.h"
 #include "core/linear_algebra.h"
-#include "solver/least_squares/fast_rows.h"
+#include "solver/least_squares/weighted.h"
 #include "solver/noise.h"
 
 namespace sateen {
@@ -14,7 +14,7 @@ namespace {
 
 constexpr float kNeverSaturates = 65536.0F;
 
-// Where the last of the sites saturates.
+// Returns the radiance at which the last of the four sites saturates.
 float FullScaleOf(const MosaicFrame& frame) {
   float most = 0.0F;
   for (size_t site = 0; site < 4; ++site) {
@@ -29,7 +29,7 @@ float ClipThreshold(const MosaicFrame& frame, const LambertianOptions& options) 
   if (frame.saturated_dn >= kNeverSaturates) {
     return kNeverSaturates;
   }
-  // A fraction of the way from zero radiance.
+  // The level is a fraction of the way from zero radiance to saturation.
   const float zero_dn = -frame.at_zero[0] / frame.per_dn[0];
   return zero_dn + static_cast<float>(options.clip_level) * (frame.saturated_dn - zero_dn);
 }
@@ -51,30 +51,29 @@ SiteNoise NoiseAt(const MosaicStack& stack, size_t frame, size_t site) {
   return noise;
 }
 
-MosaicSite::MosaicSite(const MosaicStack& stack, const Rig& rig, const LambertianOptions& options,
-                       bool weighted)
-    : stack_(stack),
-      rig_(rig),
+MosaicSite::MosaicSite(const MosaicInput& input, const LambertianOptions& options, bool weighted)
+    : input_(input),
       options_(options),
       weighted_(weighted),
-      needs_position_(!AllDistant(rig.lights)),
-      l_(static_cast<Eigen::Index>(stack.lit.size()), 3),
-      i_(static_cast<Eigen::Index>(stack.lit.size())),
-      e_(static_cast<Eigen::Index>(stack.lit.size())),
-      frames_(stack.lit.size()) {}
+      needs_position_(!AllDistant(input.rig.lights)),
+      l_(static_cast<Eigen::Index>(input.stack.lit.size()), 3),
+      i_(static_cast<Eigen::Index>(input.stack.lit.size())),
+      e_(static_cast<Eigen::Index>(input.stack.lit.size())),
+      frames_(input.stack.lit.size()) {}
 
 void MosaicSite::Gather(int column, int row, const std::vector<uint16_t>& readings, float dark,
                         SiteSolution& solution) {
   const size_t site = static_cast<size_t>(row % 2 * 2 + column % 2);
   const std::optional<Eigen::Vector3d> x_mm =
-      needs_position_ ? TablePointOfPixel(*rig_.camera, column, row, options_.HeightAt(column, row))
-                      : Eigen::Vector3d::Zero();
+      needs_position_
+          ? TablePointOfPixel(*input_.rig.camera, column, row, input_.HeightAt(column, row))
+          : Eigen::Vector3d::Zero();
   int unsaturated = 0;
   int saturated = 0;
   bool bright = false;
   double brightest = 0.0;
   for (size_t k = 0; x_mm && k < readings.size(); ++k) {
-    const MosaicFrame& frame = stack_.lit[k];
+    const MosaicFrame& frame = input_.stack.lit[k];
     const auto reading = static_cast<float>(readings[k]);
     const float radiance = frame.per_dn[site] * reading + frame.at_zero[site] - dark;
     const bool is_saturated = reading >= ClipThreshold(frame, options_);
@@ -83,8 +82,8 @@ void MosaicSite::Gather(int column, int row, const std::vector<uint16_t>& readin
       ++saturated;
       continue;
     }
-    const Incident incident = IncidentAt(rig_.lights[k], *x_mm);
-    const double e = incident.e_rgb[stack_.cfa[site]];
+    const Incident incident = IncidentAt(input_.rig.lights[k], *x_mm);
+    const double e = incident.e_rgb[input_.stack.cfa[site]];
     if (!(e > 0.0)) {
       continue;  // behind the LED
     }
@@ -135,7 +134,7 @@ SiteSolution MosaicSite::Solve(int column, int row, const std::vector<uint16_t>&
 }
 
 double MosaicSite::WeightOf(Eigen::Index k, size_t site, const Eigen::Vector3d& n) const {
-  const SiteNoise noise = NoiseAt(stack_, frames_[static_cast<size_t>(k)], site);
+  const SiteNoise noise = NoiseAt(input_.stack, frames_[static_cast<size_t>(k)], site);
   const double predicted = std::max(l_.row(k).dot(n), static_cast<double>(kLeastCosine) * n.norm());
   return e_[k] * e_[k] / (noise.shot * predicted * e_[k] + noise.read_squared);  // (2)
 }
@@ -143,9 +142,9 @@ double MosaicSite::WeightOf(Eigen::Index k, size_t site, const Eigen::Vector3d& 
 std::optional<LobeSamples> MosaicSite::LobeSamplesAt(int column, int row, const MosaicPiece& piece,
                                                      const Eigen::Vector3d& v,
                                                      const std::array<float, 256>& limit) {
-  std::vector<uint16_t> readings(stack_.lit.size());
+  std::vector<uint16_t> readings(input_.stack.lit.size());
   const size_t at =
-      static_cast<size_t>(row - piece.Begin()) * static_cast<size_t>(stack_.size_px.width) +
+      static_cast<size_t>(row - piece.Begin()) * static_cast<size_t>(input_.stack.size_px.width) +
       static_cast<size_t>(column);
   for (size_t k = 0; k < readings.size(); ++k) {
     readings[k] = piece.Reading(k, at);
@@ -162,7 +161,7 @@ std::optional<LobeSamples> MosaicSite::LobeSamplesAt(int column, int row, const 
   for (Eigen::Index k = 0; k < solution.samples; ++k) {
     weights[k] = WeightOf(k, static_cast<size_t>(row % 2 * 2 + column % 2), n);
   }
-  // As the maps count samples: 255 stands for more.
+  // Counts samples as the maps do: 255 stands for more.
   return LobeSamples(
       l, i.replicate<1, 4>(), weights, v,
       static_cast<double>(limit[static_cast<size_t>(std::min(solution.samples, 255))]));
@@ -181,10 +180,9 @@ void MosaicSite::Weigh(size_t site, SiteSolution& solution) const {
     solution.misfit = (rhs - weighted * solution.n).squaredNorm() / (solution.samples - 3);
   }
   const Eigen::Matrix3d c = (weighted.transpose() * weighted).inverse();
-  const double squared = solution.n.squaredNorm();
-  const double along = solution.n.dot(c * solution.n) / squared;
-  solution.uncertainty_deg = std::sqrt(std::max(0.0, c.trace() - along) / squared) * kDegPerRad;
-  solution.albedo_uncertainty = std::sqrt(std::max(0.0, along) / squared);
+  const NormalVariances variances = VariancesOf(c, solution.n);
+  solution.uncertainty_deg = std::sqrt(variances.angular) * kDegPerRad;
+  solution.albedo_uncertainty = std::sqrt(variances.albedo);
 }
 
 }  // namespace sateen

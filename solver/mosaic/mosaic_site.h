@@ -5,17 +5,16 @@
 #include <optional>
 #include <vector>
 
-#include "imaging/mosaic_stack.h"
-#include "rig/rig.h"
 #include "solver/lambertian.h"
 #include "solver/lobe/lobe.h"
 #include "solver/mosaic/mosaic_feed.h"
+#include "solver/solve_input.h"
 
 namespace sateen {
 
-// What a site's readings are worth, in double; zero N: no answer.
+// Solution of one site, in double.
 struct SiteSolution {
-  Eigen::Vector3d n = Eigen::Vector3d::Zero();  // N
+  Eigen::Vector3d n = Eigen::Vector3d::Zero();  // N; zero: no answer
   double residual = 0.0;
   double uncertainty_deg = 0.0;
   double albedo_uncertainty = 0.0;
@@ -24,33 +23,32 @@ struct SiteSolution {
   Reason reason = Reason::kDark;
 };
 
-// Equations (1) to (4) of solver/mosaic/mosaic.h for one site by Eigen's JacobiSVD in double, as they stand
-// there: what the kernel is tested against, and what solves the sites that it refuses.
+// Solves (1) to (4) of solver/mosaic/mosaic.h for one site by Eigen's JacobiSVD in double: the
+// plain form that the kernel is tested against, and the solver of the sites that the kernel
+// refuses. Borrows its arguments for the time of one solve.
 class MosaicSite {
  public:
-  MosaicSite(const MosaicStack& stack, const Rig& rig, const LambertianOptions& options,
-             bool weighted);
+  MosaicSite(const MosaicInput& input, const LambertianOptions& options, bool weighted);
 
-  // `readings`: of the K lit frames; `dark`: radiance of the dark frame there.
+  // Solves one site. `readings`: of the K lit frames; `dark`: radiance of the dark frame there.
   [[nodiscard]] SiteSolution Solve(int column, int row, const std::vector<uint16_t>& readings,
                                    float dark);
 
-  // The usable readings of a site of the piece, for rung 3: of one colour, four times the same. `limit` of
-  // the misfit, by how many they are.
+  // Returns the usable readings of a site of the piece for rung 3; the one colour stands in all
+  // four columns. `limit`: largest explained misfit, by the number of readings.
   [[nodiscard]] std::optional<LobeSamples> LobeSamplesAt(int column, int row,
                                                          const MosaicPiece& piece,
                                                          const Eigen::Vector3d& v,
                                                          const std::array<float, 256>& limit);
 
  private:
-  // 1 / variance of usable reading k, at what N predicts.
+  // Returns 1 / variance of usable reading k, at the brightness that N predicts.
   [[nodiscard]] double WeightOf(Eigen::Index k, size_t site, const Eigen::Vector3d& n) const;
   void Gather(int column, int row, const std::vector<uint16_t>& readings, float dark,
               SiteSolution& solution);
   void Weigh(size_t site, SiteSolution& solution) const;
 
-  const MosaicStack& stack_;
-  const Rig& rig_;
+  MosaicInput input_;
   const LambertianOptions& options_;
   bool weighted_;
   bool needs_position_;
@@ -61,15 +59,16 @@ class MosaicSite {
   std::vector<size_t> frames_;
 };
 
-// Variance of radiance i at a site: shot i + read_squared, the subtracted dark frames' part with it.
+// Variance of radiance i at a site, shot i + read_squared, with the part of the subtracted dark
+// frames.
 struct SiteNoise {
   double shot = 0.0;
   double read_squared = 0.0;
 };
 [[nodiscard]] SiteNoise NoiseAt(const MosaicStack& stack, size_t frame, size_t site);
-// Radiance above which a reading is not dark.
+// Returns the radiance above which a reading is not dark.
 [[nodiscard]] float DarkThreshold(const MosaicFrame& frame, const LambertianOptions& options);
-// Reading from which on it is saturated.
+// Returns the smallest saturated reading.
 [[nodiscard]] float ClipThreshold(const MosaicFrame& frame, const LambertianOptions& options);
 
 }  // namespace sateen

@@ -10,17 +10,16 @@
 #include <vector>
 
 #include "core/angle.h"
-#include "solver/kernels/consensus.h"
 #include "solver/noise.h"
-#include "solver/robust/plain_ladder.h"
+#include "solver/robust/consensus.h"
 
 namespace sateen {
 namespace {
 
 constexpr int kPiecesPerClimb = 8;
-constexpr int kFewestClimbs = 32;  // so that all threads have work
+constexpr int kFewestClimbs = 32;  // enough work for all threads
 constexpr size_t kSumBlock = 512;
-constexpr size_t kBlock = 64;  // pixels that are looked at together
+constexpr size_t kBlock = 64;  // pixels that are compared together
 
 bool NeedsConsensus(const Climb& climb, const NormalField& field, float misfit, size_t pixel) {
   if (field.samples.pixels[pixel] <= 3) {
@@ -36,18 +35,19 @@ bool NeedsConsensus(const Climb& climb, const NormalField& field, float misfit, 
     return false;
   }
   return field.residual.pixels[pixel] >
-         static_cast<float>(climb.options.explained_residual) * AlbedoAt(field, pixel);
+         static_cast<float>(climb.options.climb.explained_residual) * AlbedoAt(field, pixel);
 }
 
-// As FastRows::SolveConsensus, in double.
+// Does the work of FastRows::SolveConsensus in double.
 void SolveConsensusInDouble(const Climb& climb, std::span<const size_t> pixels, NormalField& field,
                             std::span<uint8_t> agreeing) {
-  PixelSystem system(climb.stack, climb.rig, climb.options.least_squares);
+  PixelSystem system(climb.input, climb.options.least_squares);
   const auto width = static_cast<size_t>(field.reason.width);
   for (size_t j = 0; j < pixels.size(); ++j) {
     const size_t pixel = pixels[j];
     system.Gather(static_cast<int>(pixel % width), static_cast<int>(pixel / width));
-    const PlainAnswer answer = PlainConsensus(system, climb.options.least_squares.max_condition);
+    const ConsensusAnswer answer =
+        PlainConsensus(system, climb.options.least_squares.max_condition);
     const Eigen::Vector3d n = answer.n.stableNormalized();
     if (!n.allFinite() || n.isZero()) {
       agreeing[j] = 0;
@@ -66,7 +66,7 @@ void SolveConsensusInDouble(const Climb& climb, std::span<const size_t> pixels, 
   }
 }
 
-// What float refused, once more in double.
+// Solves the pixels that float refused in double.
 void SolveRefusedInDouble(const Climb& climb, std::span<const size_t> pixels, NormalField& field,
                           std::span<uint8_t> agreeing) {
   std::vector<size_t> places;
@@ -87,7 +87,7 @@ void SolveRefusedInDouble(const Climb& climb, std::span<const size_t> pixels, No
   }
 }
 
-// Sum of some hundred uncertainties, in eight lanes, so that it becomes a vector.
+// Adds some hundred uncertainties in eight lanes, which the compiler turns into a vector.
 double SumOf(std::span<const float> values) {
   std::array<float, 8> sums = {};
   size_t j = 0;
@@ -106,19 +106,20 @@ double SumOf(std::span<const float> values) {
   return total;
 }
 
-// Appends those pixels of [first, first + misfits.size()) that have to climb.
+// Appends the pixels of [first, first + misfits.size()) that have to climb.
 void FindClimbers(const Climb& climb, std::span<const float> misfits, size_t first,
                   const NormalField& field, std::vector<size_t>& pixels) {
   if (climb.options.mode == LadderMode::kLeastSquares) {
     return;
   }
-  // More samples, lower limit.
-  const float lowest = climb.limit[std::min<size_t>(climb.stack.size(), climb.limit.size() - 1)];
+  // The limit falls with the number of samples.
+  const float lowest =
+      climb.limit[std::min<size_t>(climb.input.stack.size(), climb.limit.size() - 1)];
   for (size_t begin = 0; begin < misfits.size(); begin += kBlock) {
     const std::span<const float> block =
         misfits.subspan(begin, std::min(kBlock, misfits.size() - begin));
     int suspects = climb.options.mode == LadderMode::kConsensus ? 1 : 0;
-    for (const float misfit : block) {  // without branches, so that this becomes a vector
+    for (const float misfit : block) {  // without branches: becomes a vector
       suspects |= misfit > lowest ? 1 : 0;
     }
     for (size_t j = 0; suspects != 0 && j < block.size(); ++j) {
@@ -130,7 +131,7 @@ void FindClimbers(const Climb& climb, std::span<const float> misfits, size_t fir
   }
 }
 
-// Rung 2 for listed pixels.
+// Solves listed pixels on rung 2.
 void ClimbPixels(const Climb& climb, const ListedPixels& listed, NormalField& field,
                  PieceSummary& summary) {
   const std::vector<size_t>& pixels = listed.pixels;
@@ -148,17 +149,18 @@ void ClimbPixels(const Climb& climb, const ListedPixels& listed, NormalField& fi
   JudgeConsensus(pixels, before, EstimatesAt(field, pixels, albedo), agreeing, field, summary);
 }
 
-// Rung 3 for those pixels from `first` on that the scene's lobe explains and rung 1 does not explain better.
+// Gives rung 3 to the pixels from `first` on that the scene's lobe explains, unless rung 1 explains
+// them better.
 void SolveUnderLobe(const Climb& climb, size_t first, std::span<const float> misfits,
                     NormalField& field, PieceSummary& summary) {
-  PixelSystem system(climb.stack, climb.rig, climb.options.least_squares);
+  PixelSystem system(climb.input, climb.options.least_squares);
   const auto width = static_cast<size_t>(field.reason.width);
   for (size_t j = 0; j < misfits.size(); ++j) {
     const size_t pixel = first + j;
     const auto column = static_cast<int>(pixel % width);
     const auto row = static_cast<int>(pixel / width);
     const std::optional<Eigen::Vector3d> v =
-        IsSolved(field, pixel) ? ViewOf(climb.rig, column, row) : std::nullopt;
+        IsSolved(field, pixel) ? ViewOf(climb.input.rig, column, row) : std::nullopt;
     if (!v) {
       continue;
     }
@@ -186,7 +188,7 @@ void SolveUnderLobe(const Climb& climb, size_t first, std::span<const float> mis
   }
 }
 
-// Rungs 1 and 3 for rows [begin, end); appends the pixels that have to climb.
+// Solves rows [begin, end) on rungs 1 and 3; appends the pixels that have to climb.
 void SolvePiece(const Climb& climb, int begin, int end, NormalField& field, PieceSummary& summary,
                 ListedPixels& climbers) {
   const PixelGeometry geometry = climb.rows.GeometryOf(begin, end);
@@ -224,16 +226,15 @@ void SolvePiece(const Climb& climb, int begin, int end, NormalField& field, Piec
 
 }  // namespace
 
-Climb MakeClimb(const LightStack& stack, const Rig& rig, const LadderOptions& options,
+Climb MakeClimb(const FramesInput& input, const LadderOptions& options,
                 const LeastSquaresRows& rows, const StackNoise& noise, double scale_squared) {
-  return {stack,
-          rig,
+  return {input,
           options,
           rows,
           noise,
           scale_squared,
-          MisfitLimits(scale_squared, options.false_alarms),
-          LightDoubt::Make(rig, stack[0].rgb.Size()),
+          MisfitLimits(scale_squared, options.climb.false_alarms),
+          LightDoubt::Make(input.rig, input.stack[0].rgb.Size()),
           std::nullopt};
 }
 

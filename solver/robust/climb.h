@@ -11,29 +11,28 @@
 
 namespace sateen {
 
-// What every pixel of a ladder's stack is judged by.
+// One solve by the ladder.
 struct Climb {
-  const LightStack& stack;
-  const Rig& rig;
+  FramesInput input;
   const LadderOptions& options;
   const LeastSquaresRows& rows;
   const StackNoise& noise;
   double scale_squared = 1.0;         // s^2
-  std::array<float, 256> limit = {};  // of the misfit, by usable samples
+  std::array<float, 256> limit = {};  // largest explained misfit, by usable samples
   std::optional<LightDoubt> light_doubt;
   std::optional<Lobe> lobe;
 };
 
-// The limits of equation (5)'s misfits.
-[[nodiscard]] Climb MakeClimb(const LightStack& stack, const Rig& rig, const LadderOptions& options,
+// Computes the limits of the misfits and the doubt about the lights.
+[[nodiscard]] Climb MakeClimb(const FramesInput& input, const LadderOptions& options,
                               const LeastSquaresRows& rows, const StackNoise& noise,
                               double scale_squared);
 
-// Rows that SolveAndClimb takes at a time: several pieces, because those few pixels of a piece that climb
-// do not fill a vector.
+// Returns the number of rows to give to SolveAndClimb(): several pieces, because the few pixels of
+// one piece that climb do not fill a vector.
 [[nodiscard]] int RowsPerClimb(ImageSize size);
 
-// All rungs for rows [begin, end), piece by piece while their samples are in the cache.
+// Solves rows [begin, end) on all rungs, piece by piece while their samples are in the cache.
 [[nodiscard]] PieceSummary SolveAndClimb(const Climb& climb, int begin, int end,
                                          NormalField& field);
 

@@ -4,48 +4,49 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <utility>
 #include <vector>
 
+#include "core/statistics.h"
 #include "solver/noise.h"
 
 namespace sateen {
 namespace {
 
-// Of the misfits, for the noise's scale. Where its gain is unknown only the best pixels tell of it,
-// because of a shiny sample most of them tell of the shine.
+// Quantiles of the misfits.
 constexpr double kShareOfKnown = 0.25;
 constexpr double kShareOfUnknown = 0.05;
-// Demosaicing leaves at least this of the variance: a quarter of it where four sites are averaged,
-// and the luminance averages three colours that have sites in common.
+// Smallest share of the variance that demosaicing leaves: a quarter where four sites are averaged,
+// and the luminance averages three colours that share sites.
 constexpr double kLeastScaleSquared = 0.1;
 constexpr double kQuarterOfOneFreedom = 0.1015;  // quantile of chi^2
-// Pixels whose misfits are looked at, in runs, because neighbours are looked at, too; more where
-// fewer than kFewestMisfits of them are solved.
+// Pixels that are sampled, in runs because neighbours are compared; more where fewer than
+// kFewestMisfits of them are solved.
 constexpr int64_t kMisfitsLookedAt = 1 << 12;
 constexpr int64_t kFewestMisfits = 1 << 11;
 constexpr int64_t kRun = 64;
 constexpr size_t kNeighbourStep = 3;  // differences then share no sample
 constexpr size_t kDifferencesLookedAt = 1 << 12;
 constexpr double kGoldenRatio = 0.6180339887498949;
-// Rounding's variance is 1/12 of a step squared, of which 1/6 goes for the variance of a sample; of
-// the second differences that do not vanish at least this share are single steps.
+// Variance of a second difference of rounded samples, 6/12 of a step squared.
 constexpr double kRoundingOfStep = 6.0 / 12.0;
+// Share of the second differences that do not vanish and are at most single steps.
 constexpr double kShareOfSteps = 0.05;
-// Second differences below this fraction of the first, or of the samples, vanish: steps of equal
-// size, of an 8-bit file as sRGB, too, and what rounding to float leaves of nothing.
+// Fractions of the first differences and of the samples below which second differences vanish:
+// steps of equal size, also of 8-bit sRGB files, and rounding to float.
 constexpr float kLeastBend = 0.02F;
 constexpr float kFloatBend = 4.0F * std::numeric_limits<float>::epsilon();
 constexpr auto kFloatStep = static_cast<double>(std::numeric_limits<float>::epsilon());
 constexpr double kNotKnown = std::numeric_limits<double>::infinity();
 
-// The pixels inside the mask, in their own order.
+// Pixels inside the mask, in their own order.
 class InsidePixels {
  public:
-  InsidePixels(ImageSize size, const std::optional<Mask>& mask) : mask_(mask) {
+  InsidePixels(ImageSize size, const Mask* mask) : mask_(mask) {
     before_.push_back(0);
     for (int row = 0; row < size.height; ++row) {
       int64_t inside = size.width;
-      if (mask) {
+      if (mask != nullptr) {
         const auto begin = mask->pixels.begin() + static_cast<std::ptrdiff_t>(mask->Index(0, row));
         inside = size.width - std::count(begin, begin + size.width, uint8_t{0});
       }
@@ -62,7 +63,7 @@ class InsidePixels {
       const auto row = static_cast<size_t>(after - before_.begin()) - 1;
       int64_t order = before_[row];
       for (size_t p = row * width_; p < (row + 1) * width_ && begin < end; ++p) {
-        if (mask_ && mask_->pixels[p] == 0) {
+        if (mask_ != nullptr && mask_->pixels[p] == 0) {
           continue;
         }
         if (order == begin) {
@@ -75,13 +76,13 @@ class InsidePixels {
   }
 
  private:
-  const std::optional<Mask>& mask_;
+  const Mask* mask_;
   size_t width_ = 0;
   std::vector<int64_t> before_;  // pixels in the rows above
 };
 
-// `count` pixels in runs, one in each of as many equal stretches and, lest they meet a pattern of the
-// cloth, at different places of theirs; all where there are no more.
+// Returns `count` pixels in runs, or all where there are not many more. Each run lies in one of as
+// many equal stretches, at varying places so that the runs do not meet a pattern of the cloth.
 std::vector<size_t> PixelsLookedAt(const InsidePixels& inside, int64_t count) {
   std::vector<size_t> pixels;
   if (inside.Count() <= 2 * count) {
@@ -99,9 +100,8 @@ std::vector<size_t> PixelsLookedAt(const InsidePixels& inside, int64_t count) {
   return pixels;
 }
 
-MisfitSample SampleMisfits(const LightStack& stack, const std::optional<Mask>& mask,
-                           const LeastSquaresRows& rows) {
-  const InsidePixels inside(stack[0].rgb.Size(), mask);
+MisfitSample SampleMisfits(const FramesInput& input, const LeastSquaresRows& rows) {
+  const InsidePixels inside(input.stack[0].rgb.Size(), input.mask);
   MisfitSample sample;
   for (int64_t count = kMisfitsLookedAt;; count *= 8) {
     sample.pixels = PixelsLookedAt(inside, count);
@@ -114,7 +114,7 @@ MisfitSample SampleMisfits(const LightStack& stack, const std::optional<Mask>& m
   }
 }
 
-// How many usable samples most of these pixels have, of those that leave a residual; 0: none.
+// Returns the most frequent number of usable samples that leaves a residual; 0: none does.
 int UsualSamples(const MisfitSample& sample) {
   std::array<int64_t, 256> counts = {};
   for (const uint8_t samples : sample.samples) {
@@ -124,17 +124,16 @@ int UsualSamples(const MisfitSample& sample) {
   return *most > 0 ? static_cast<int>(most - counts.begin()) : 0;
 }
 
-// What neighbouring samples tell of the noise.
+// Noise as neighbouring samples show it.
 struct Neighbours {
-  double scale_squared = kNotKnown;  // infinite where they tell nothing
-  double floor = 0.0;                // of s^2: what rounding to float leaves, in exact frames, too
+  double scale_squared = kNotKnown;  // infinite where they show nothing
+  double floor = 0.0;                // of s^2: the variance of rounding, also in exact frames
 };
 
-// s^2 where noise is unknown, var = s^2 i, from second differences along the rows of green samples,
-// of variance 6 var: too large by what the surface does from pixel to pixel, not by what the model
-// does not know. Differences that vanish are the work of rounding to few bits, which is not without
-// noise: where they are many, s^2 is the mean, and at least the variance of rounding, 1/12 of a step
-// squared.
+// Measures s^2 of unknown noise, var = s^2 i, from second differences of green samples along the
+// rows, whose variance is 6 var. Changes of the surface from pixel to pixel make it too large,
+// errors of the model do not. Differences that vanish come from rounding to few bits. Where they
+// are many, s^2 is the mean, and at least the variance of rounding.
 Neighbours LookAtNeighbours(const LightStack& stack, const MisfitSample& sample) {
   std::vector<float> squares;
   squares.reserve(stack.size() * sample.pixels.size() / kNeighbourStep + stack.size());
@@ -142,7 +141,7 @@ Neighbours LookAtNeighbours(const LightStack& stack, const MisfitSample& sample)
   double sum_of_means = 0.0;
   size_t count = 0;
   const auto width = static_cast<size_t>(stack[0].rgb[0].width);
-  // Of many differences some lights' at each pixel, in turn.
+  // Takes some of the lights at each pixel, in turn, where there are many differences.
   const size_t all_differences = stack.size() * (sample.pixels.size() / kNeighbourStep);
   const size_t light_step =
       std::clamp<size_t>(all_differences / kDifferencesLookedAt, 1, stack.size());
@@ -171,11 +170,11 @@ Neighbours LookAtNeighbours(const LightStack& stack, const MisfitSample& sample)
   }
   const auto all = static_cast<double>(count);
   const double of_float = kFloatStep * kFloatStep / 12.0 * sum_of_means / all;
-  const auto quarter = static_cast<double>(QuantileOf(squares, 0.25));
+  const auto quarter = static_cast<double>(Quantile(squares, 0.25));
   if (4 * squares.size() >= 3 * count) {
     return {.scale_squared = quarter / kQuarterOfOneFreedom, .floor = of_float};
   }
-  const auto least = static_cast<double>(QuantileOf(squares, kShareOfSteps));
+  const auto least = static_cast<double>(Quantile(std::move(squares), kShareOfSteps));
   return {.scale_squared = std::max(sum_of_squares / all, kRoundingOfStep * quarter),
           .floor = std::max(of_float, kRoundingOfStep * least)};
 }
@@ -191,7 +190,7 @@ double ScaleSquaredOf(const LightStack& stack, const MisfitSample& sample, bool 
       }
     }
     const double share = known ? kShareOfKnown : kShareOfUnknown;
-    scale = static_cast<double>(QuantileOf(misfits, share)) /
+    scale = static_cast<double>(Quantile(std::move(misfits), share)) /
             ReducedChiSquaredQuantile(share, usual - 3);
   }
   if (known) {
@@ -207,11 +206,10 @@ double ScaleSquaredOf(const LightStack& stack, const MisfitSample& sample, bool 
 
 }  // namespace
 
-NoiseScale FindNoiseScale(const LightStack& stack, const std::optional<Mask>& mask,
-                          const LeastSquaresRows& rows, bool known) {
+NoiseScale FindNoiseScale(const FramesInput& input, const LeastSquaresRows& rows, bool known) {
   NoiseScale scale;
-  scale.sample = SampleMisfits(stack, mask, rows);
-  scale.scale_squared = ScaleSquaredOf(stack, scale.sample, known);
+  scale.sample = SampleMisfits(input, rows);
+  scale.scale_squared = ScaleSquaredOf(input.stack, scale.sample, known);
   return scale;
 }
 

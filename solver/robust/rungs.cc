@@ -2,35 +2,34 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <limits>
 
 #include "core/angle.h"
-#include "solver/kernels/consensus.h"
+#include "core/stopwatch.h"
 #include "solver/least_squares/least_squares.h"
 #include "solver/noise.h"
+#include "solver/robust/consensus.h"
 
 namespace sateen {
 namespace {
 
 constexpr double kUnexplainedFactor = 3.0;
-// Where the search has no answer: root mean square angle of the hemisphere's normals to its middle, some 60.
+// Uncertainty without an answer: the root mean square angle of a hemisphere's normals to its
+// middle.
 constexpr float kAnyNormalDeg = 60.0F;
-// Where many pixels climb, the model is wrong in what noise hides in the others, too: fully from this
-// share on, and not at all where false alarms are as many.
+// Shares of climbing pixels from which the model counts as wholly wrong for the others, too, and up
+// to which it does not count as wrong: false alarms are as many.
 constexpr double kDoubtfulShare = 0.2;
 constexpr double kUndoubtedShare = 0.02;
 
 struct Difference {
   double turned_deg;
-  double albedo;  // over that of the second, at most 1
+  double albedo;  // relative to the second, at most 1
 };
 
 Difference DifferenceOf(const Estimate& a, const Estimate& b) {
-  const double turned_deg =
-      std::atan2(static_cast<double>(a.n.cross(b.n).norm()), static_cast<double>(a.n.dot(b.n))) *
-      kDegPerRad;
+  const double turned_deg = AngleBetweenRad(a.n, b.n) * kDegPerRad;
   const double change = std::abs(static_cast<double>(a.albedo / b.albedo) - 1.0);
   return {turned_deg, change <= 1.0 ? change : 1.0};
 }
@@ -165,9 +164,9 @@ bool TakesLobe(const LobeAnswer& answer, float albedo_of_lobe, double share,
 }
 
 double SecondsOf(const std::function<void()>& work) {
-  const auto start = std::chrono::steady_clock::now();
+  const Stopwatch stopwatch;
   work();
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  return stopwatch.Seconds();
 }
 
 void ReportRungs(const PieceSummary& total, SolveSummary& summary) {

@@ -26,9 +26,9 @@ double MaxErrorDeg(const NormalField& field, const DrapedScene& scene) {
 }
 
 NormalField Solved(const DrapedScene& scene, const Rig& rig, Backend backend = Backend::kAuto,
-                   const Image<float>* height_mm = nullptr) {
-  return SolveLambertian(scene.rendered.stack, rig, std::nullopt,
-                         {.backend = backend, .height_mm = height_mm})
+                   const std::optional<Image<float>>& height_mm = std::nullopt) {
+  return SolveLambertian(scene.rendered.stack, rig, std::nullopt, {.backend = backend}, {},
+                         height_mm)
       .value();
 }
 
@@ -104,21 +104,19 @@ TEST_P(EveryLight, HeightsOfEachPixelAreExactInEveryBackend) {
 
   for (const Backend backend : kAllBackends) {
     SCOPED_TRACE(Name(backend));
-    EXPECT_LT(MaxErrorDeg(Solved(scene, rig, backend, &scene.height_mm), scene), 5e-5);
+    EXPECT_LT(MaxErrorDeg(Solved(scene, rig, backend, scene.height_mm), scene), 5e-5);
   }
   EXPECT_GT(MeanErrorDeg(Solved(scene, rig), scene), 0.4);
-  EXPECT_GT(MeanErrorDeg(Solved(scene, rig, Backend::kAuto, &wrong_way), scene),
+  EXPECT_GT(MeanErrorDeg(Solved(scene, rig, Backend::kAuto, wrong_way), scene),
             1.5 * MeanErrorDeg(Solved(scene, rig), scene));
 }
 
 TEST_P(EveryLight, HeightsReachEveryRungAndTheMosaics) {
   const Rig rig = CloseRig(kDrapeSize, GetParam());
   DrapedScene scene = RenderDrape({.amplitude_mm = 8.0}, rig);
-  const LambertianOptions at_height{.height_mm = &scene.height_mm};
 
   const auto solve_rung = [&](LadderMode mode) {
-    return SolveLadder(scene.rendered.stack, rig, std::nullopt,
-                       {.mode = mode, .least_squares = at_height})
+    return SolveLadder(scene.rendered.stack, rig, std::nullopt, {.mode = mode}, {}, scene.height_mm)
         .value();
   };
   EXPECT_LT(MaxErrorDeg(solve_rung(LadderMode::kLeastSquares), scene), 1e-4);
@@ -126,13 +124,11 @@ TEST_P(EveryLight, HeightsReachEveryRungAndTheMosaics) {
   Readings readings(scene.rendered, rig);
   // Half a step of 16 bits at a third of full scale is 1.4e-3 degrees.
   for (const Backend backend : {Backend::kAuto, Backend::kJacobiSvd}) {
-    const NormalField plain =
-        readings.Solve(rig, {.mode = std::nullopt,
-                             .least_squares = {.backend = backend, .height_mm = &scene.height_mm}});
+    const NormalField plain = readings.Solve(rig, Plain(backend), 0, std::nullopt, scene.height_mm);
     EXPECT_LT(MaxErrorDeg(plain, scene), 4e-3);
   }
   for (const LadderMode mode : {LadderMode::kAuto, LadderMode::kConsensus}) {
-    const NormalField field = readings.Solve(rig, {.mode = mode, .least_squares = at_height});
+    const NormalField field = readings.Solve(rig, {.mode = mode}, 0, std::nullopt, scene.height_mm);
     EXPECT_LT(MaxErrorDeg(field, scene), mode == LadderMode::kAuto ? 4e-3 : 0.03);  // of triples
   }
   EXPECT_GT(MeanErrorDeg(readings.Solve(rig), scene), 0.2);
@@ -143,7 +139,7 @@ TEST(Height, OfZeroChangesNoBit) {
   const DrapedScene scene = RenderDrape({.amplitude_mm = 3.0}, rig);
   const Image<float> zero(kDrapeSize);
 
-  EXPECT_TRUE(SameBits(Solved(scene, rig), Solved(scene, rig, Backend::kAuto, &zero)));
+  EXPECT_TRUE(SameBits(Solved(scene, rig), Solved(scene, rig, Backend::kAuto, zero)));
   EXPECT_TRUE(SameBits(Solved(scene, rig), Solved(scene, Lifted(rig, 0.0).value())));
 }
 
@@ -242,7 +238,7 @@ TEST_P(EveryLight, ASecondSolveAtTheHeightsOfTheFirstIsFarBetter) {
 
   const NormalField first = Solved(scene, lifted);
   const Image<float> height = IntegrateNormals(first, *lifted.camera).value();
-  const NormalField second = Solved(scene, lifted, Backend::kAuto, &height);
+  const NormalField second = Solved(scene, lifted, Backend::kAuto, height);
 
   const NormalField on_table = Solved(scene, rig);
   fmt::print(
@@ -261,7 +257,7 @@ TEST(Height, OutOfRangeIsRefusedByName) {
   const Rig rig = CloseRig(kDrapeSize);
   const DrapedScene scene = RenderDrape({}, rig);
   const auto message = [&](const Image<float>& height_mm) {
-    return SolveLambertian(scene.rendered.stack, rig, std::nullopt, {.height_mm = &height_mm})
+    return SolveLambertian(scene.rendered.stack, rig, std::nullopt, {}, {}, height_mm)
         .error()
         .message;
   };

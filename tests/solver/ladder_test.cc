@@ -216,7 +216,7 @@ TEST(SolveLadder, NamesTheOptionThatIsOutOfRange) {
   const RenderedRelief rendered = Render(rig, {4, 3});
   for (const double bad : {0.0, 0.5, std::nan("")}) {
     LadderOptions options;
-    options.false_alarms = bad;
+    options.climb.false_alarms = bad;
     const Result<NormalField> field = SolveLadder(rendered.stack, rig, std::nullopt, options);
     ASSERT_FALSE(field);
     EXPECT_NE(field.error().message.find("false_alarms"), std::string::npos);

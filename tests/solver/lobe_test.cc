@@ -30,7 +30,7 @@ constexpr Lobe kYarns{.model = LobeModel::kGgxAnisotropic,
 constexpr ImageSize kLobeSize{64, 48};
 constexpr double kElectrons = 400000.0;
 
-// (13) of solver/ladder.h by reflectance/.
+// (1) of solver/lobe/lobe.h by reflectance/.
 double ValueByReflectance(const Lobe& lobe, const Eigen::Vector3d& n, const Eigen::Vector3d& l,
                           const Eigen::Vector3d& v) {
   const SpecularSpec spec{.f0 = Eigen::Vector3d::Constant(0.04), .alpha = lobe.alpha};

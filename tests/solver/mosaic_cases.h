@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <memory>
 #include <optional>
 #include <vector>
 
@@ -83,12 +84,10 @@ struct Readings {
   }
 
   [[nodiscard]] NormalField Solve(const Rig& rig, const MosaicOptions& options = {},
-                                  int threads = 0, const std::optional<Mask>& mask = std::nullopt) {
-    const MosaicsInMemory rows(frames);
-    stack.rows = &rows;
-    NormalField field = SolveMosaic(stack, rig, mask, options, {.threads = threads}).value();
-    stack.rows = nullptr;
-    return field;
+                                  int threads = 0, const std::optional<Mask>& mask = std::nullopt,
+                                  const std::optional<Image<float>>& height_mm = std::nullopt) {
+    stack.rows = std::make_shared<MosaicsInMemory>(frames);
+    return SolveMosaic(stack, rig, mask, options, {.threads = threads}, height_mm).value();
   }
 };
 

@@ -206,8 +206,7 @@ TEST(MosaicTest, BandsAndThreadsGiveTheSameBits) {
   const NormalField whole = readings.Solve(rig, {}, 1, mask);
   EXPECT_TRUE(SameBits(whole, readings.Solve(rig, {}, 3, mask)));
   EXPECT_EQ(ReasonAt(whole, mask.Index(31, 21)), Reason::kOutsideMask);
-  const MosaicsInMemory rows(readings.frames);
-  readings.stack.rows = &rows;
+  readings.stack.rows = std::make_shared<MosaicsInMemory>(readings.frames);
   for (const int band_rows : {1, 7, 64}) {
     NormalField joined;
     joined.Resize(kSize);
@@ -271,12 +270,14 @@ TEST(MosaicTest, UnsolvableSitesHaveTheirReason) {
 TEST(MosaicTest, WhatCannotBeSolvedIsRefusedInWords) {
   const Rig rig = DistantRig(DistantRing(5, 40.0 * kRadPerDeg));
   Readings readings(Render(rig, kSize), rig);
-  const MosaicsInMemory rows(readings.frames);
-  readings.stack.rows = &rows;
+  readings.stack.rows = std::make_shared<MosaicsInMemory>(readings.frames);
   const auto refusal = [&](const MosaicStack& stack, const MosaicOptions& options = {}) {
     const Result<NormalField> field = SolveMosaic(stack, rig, std::nullopt, options);
     return field ? std::string("solved") : field.error().message;
   };
+  MosaicStack empty = readings.stack;
+  empty.rows = nullptr;
+  EXPECT_THAT(refusal(empty), ::testing::HasSubstr("no readings"));
   MosaicStack fewer = readings.stack;
   fewer.lit.pop_back();
   EXPECT_THAT(refusal(fewer), ::testing::HasSubstr("4 frames but 5 lights"));
