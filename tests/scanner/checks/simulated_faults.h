@@ -7,11 +7,11 @@
 #include <vector>
 
 #include "tests/scanner/checks/simulated_looks.h"
+#include "tests/testing/seeds.h"
 
 // Simulated sessions with what goes wrong in a capture, and how often each is found.
 namespace sateen::testing {
 
-inline constexpr int kSeeds = 25;  // of each fabric
 inline constexpr double kRulerMm = 30.0;
 inline const Eigen::Vector2d kNudgePx(-1.8, 2.4);  // 3 px
 
@@ -122,22 +122,23 @@ struct Clean {
   }
 };
 
-// Sessions of these fabrics: 25 clean ones of each, and each fault in every other.
+// Sessions of these fabrics: 25 clean ones of each, or few, and each fault in every other.
 // The bars: each fault is found in 99 of 100 sessions, and is the only one; 1 false alarm in 200.
 inline void ExpectFaultsAreFound(const std::vector<std::string>& fabrics, uint64_t first_seed) {
+  const int seeds = SeedsOf(25, 5);
   const Rig calibrated = CalibratedRig();
   std::vector<Rate> rates = Rates();
   Clean clean;
   double nudge_error = 0.0;
   for (const std::string& name : fabrics) {
     const Fabric fabric(name, calibrated, kNudgePx);
-    for (int i = 0; i < kSeeds; ++i) {
+    for (int i = 0; i < seeds; ++i) {
       const uint64_t seed = HashOf(1, first_seed + static_cast<uint64_t>(clean.sessions));
       const Rig rig = i / 2 % 2 == 0 ? calibrated : RoughRig(calibrated, kRulerMm, seed);
       const SessionLooks looks(fabric, seed);
       clean.Add(name, CheckCapture(rig, looks.Looks(), {}));
       if (i % 2 == 1) {
-        continue;  // 100 sessions with each fault
+        continue;
       }
       for (Rate& rate : rates) {
         SessionLooks damaged = looks;
