@@ -131,7 +131,7 @@ TEST_F(SolvePipeline, WithoutACameraThereIsNoPixelSize) {
 TEST_F(SolvePipeline, WarningsAreToldAtOnceAndKept) {
   std::vector<std::string> told;
   Rig rig = UnevenRig();
-  rig.lights[0].position_mm.x() += 100.0;  // as of another rig
+  rig.lights[0].position_mm.x() += 200.0;  // as of another rig
   WriteText(Path("other.json"), RigToJson(rig));
   SolveOptions options{.capture = Path("session"), .output = Path("maps")};
   options.rig_file = Path("other.json");
