@@ -8,6 +8,7 @@
 #include "cli/choice.h"
 #include "cli/solve_report.h"
 #include "imaging/encoding_name.h"
+#include "pipelines/solve/solve.h"
 
 namespace sateen::cli {
 namespace {

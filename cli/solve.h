@@ -4,7 +4,7 @@
 
 #include "cli/command.h"
 #include "core/task.h"
-#include "pipelines/solve/solve.h"
+#include "pipelines/solve/solve_options.h"
 
 namespace sateen::cli {
 

@@ -1,11 +1,8 @@
 #include "pipelines/solve/maps_facts.h"
 
-#include "pipelines/solve/solve.h"
 #include "rig/pixel_pitch.h"
 
 namespace sateen {
-
-std::string_view Name(NormalY normal_y) { return normal_y == NormalY::kUp ? "up" : "down"; }
 
 MapsFacts MapsFactsOf(const SolveOptions& options, const Rig& rig) {
   MapsFacts facts{

@@ -1,23 +1,12 @@
 #pragma once
 
 #include <optional>
-#include <string_view>
 
+#include "pipelines/solve/solve_options.h"
 #include "rig/camera.h"
 #include "rig/rig.h"
 
 namespace sateen {
-
-struct SolveOptions;
-
-// Direction of y in normal maps.
-enum class NormalY {
-  kUp,   // OpenGL, glTF
-  kDown  // DirectX
-};
-
-// "up", "down".
-[[nodiscard]] std::string_view Name(NormalY normal_y);
 
 // Facts that hold for all maps of a solve, whichever way they are written.
 struct MapsFacts {

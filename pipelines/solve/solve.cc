@@ -91,14 +91,6 @@ Status SolveWhole(const SolveOptions& options, const Task& task, OutputFolder& f
 
 }  // namespace
 
-std::string_view Name(Domain domain) {
-  return domain == Domain::kAuto ? "auto" : domain == Domain::kRaw ? "raw" : "rgb";
-}
-
-std::string_view Name(const std::optional<LadderMode>& robust) {
-  return robust ? Name(*robust) : "none";
-}
-
 bool Passed(const SolveOptions& options, const Evaluation& evaluation) {
   // Not "above", so that NaN does not pass.
   return !options.fail_above_deg || (evaluation.angular_error_deg.has_value() &&

@@ -6,6 +6,8 @@
 #include <string_view>
 #include <utility>
 
+#include "pipelines/solve/solve.h"
+
 namespace sateen {
 namespace {
 

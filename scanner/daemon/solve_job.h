@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "pipelines/solve/solve.h"
+#include "pipelines/solve/solve_options.h"
 #include "scanner/daemon/job.h"
 
 namespace sateen {
