@@ -24,6 +24,7 @@
 #include "core/sha256.h"
 #include "imaging/dng.h"
 #include "imaging/raw.h"
+#include "rig/projection.h"
 #include "rig/rig.h"
 #include "scanner/sessions/session.h"
 #include "simulation/random.h"

@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "rig/projection.h"
+
 namespace sateen {
 
 std::optional<double> PixelPitchMm(const Camera& camera) {

@@ -1,5 +1,7 @@
 #include "rig/rig.h"
 
+#include <fmt/format.h>
+
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>

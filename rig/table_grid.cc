@@ -6,6 +6,7 @@
 
 #include "core/check.h"
 #include "rig/pixel_cubic.h"
+#include "rig/projection.h"
 
 namespace sateen {
 namespace {

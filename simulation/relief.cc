@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "core/parallel.h"
+#include "rig/projection.h"
 #include "simulation/random.h"
 
 namespace sateen {

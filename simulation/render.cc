@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "core/parallel.h"
+#include "rig/projection.h"
 #include "simulation/optics.h"
 #include "simulation/random.h"
 #include "simulation/trace.h"

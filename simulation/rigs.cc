@@ -3,6 +3,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "rig/projection.h"
+
 namespace sateen {
 namespace {
 

@@ -1,5 +1,7 @@
 #include "simulation/scene.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <numbers>

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "core/parallel.h"
+#include "rig/projection.h"
 
 namespace sateen {
 namespace {

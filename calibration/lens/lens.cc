@@ -10,6 +10,7 @@
 #include "calibration/print/plane_map.h"
 #include "calibration/print/pose_solve.h"
 #include "core/angle.h"
+#include "rig/projection.h"
 
 namespace sateen {
 namespace {

@@ -8,6 +8,7 @@
 
 #include "calibration/print/markers.h"
 #include "calibration/print/plane_map.h"
+#include "rig/projection.h"
 
 namespace sateen {
 namespace {

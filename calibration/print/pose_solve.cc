@@ -7,6 +7,7 @@
 #include "calibration/print/plane_map.h"
 #include "core/angle.h"
 #include "core/linear_algebra.h"
+#include "rig/projection.h"
 
 namespace sateen {
 namespace {

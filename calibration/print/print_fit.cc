@@ -7,6 +7,7 @@
 
 #include "calibration/print/marker_blur.h"
 #include "core/linear_algebra.h"
+#include "rig/projection.h"
 
 namespace sateen {
 namespace {

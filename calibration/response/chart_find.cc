@@ -6,6 +6,8 @@
 #include <numbers>
 #include <vector>
 
+#include "rig/projection.h"
+
 namespace sateen {
 namespace {
 

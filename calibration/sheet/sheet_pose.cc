@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "calibration/fit/robust_spread.h"
 #include "calibration/print/border_view.h"

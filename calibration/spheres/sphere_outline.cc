@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "calibration/spheres/sphere_edges.h"
+#include "rig/projection.h"
 
 namespace sateen {
 namespace {

@@ -6,6 +6,7 @@
 
 #include "core/angle.h"
 #include "core/linear_algebra.h"
+#include "rig/projection.h"
 
 namespace sateen {
 namespace {

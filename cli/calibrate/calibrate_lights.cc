@@ -1,5 +1,7 @@
 #include "cli/calibrate/calibrate_lights.h"
 
+#include <fmt/format.h>
+
 #include <CLI/CLI.hpp>
 #include <algorithm>
 

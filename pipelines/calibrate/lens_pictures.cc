@@ -8,6 +8,7 @@
 #include "core/output_folder.h"
 #include "imaging/image_io.h"
 #include "imaging/show/canvas.h"
+#include "rig/projection.h"
 #include "scanner/sessions/board_photos.h"
 
 namespace sateen {

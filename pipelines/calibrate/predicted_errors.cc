@@ -10,6 +10,7 @@
 #include "core/angle.h"
 #include "core/parallel.h"
 #include "pipelines/calibrate/synthetic_sheets.h"
+#include "rig/projection.h"
 #include "simulation/random.h"
 
 namespace sateen {

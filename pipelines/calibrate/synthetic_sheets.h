@@ -11,6 +11,7 @@
 #include "core/angle.h"
 #include "rig/camera.h"
 #include "rig/light.h"
+#include "rig/projection.h"
 #include "simulation/random.h"
 
 // In a header alone, because tests of modules below cli/ use it too.

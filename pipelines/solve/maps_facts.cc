@@ -1,6 +1,7 @@
 #include "pipelines/solve/maps_facts.h"
 
 #include "rig/pixel_pitch.h"
+#include "rig/projection.h"
 
 namespace sateen {
 

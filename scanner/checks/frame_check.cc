@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "rig/projection.h"
 #include "scanner/checks/frame_compare.h"
 
 namespace sateen {

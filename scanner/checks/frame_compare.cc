@@ -5,6 +5,7 @@
 #include <string>
 #include <utility>
 
+#include "rig/projection.h"
 #include "scanner/checks/shade_check.h"
 
 namespace sateen {

@@ -1,5 +1,7 @@
 #include "scanner/sessions/session_json.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "rig/projection.h"
+
 namespace sateen {
 namespace {
 

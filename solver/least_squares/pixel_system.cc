@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "imaging/color.h"
+#include "rig/projection.h"
 
 namespace sateen {
 

@@ -14,6 +14,7 @@
 #include "core/gauss_newton.h"
 #include "core/linear_algebra.h"
 #include "imaging/color.h"
+#include "rig/projection.h"
 
 namespace sateen {
 namespace {

@@ -6,6 +6,7 @@
 
 #include "core/angle.h"
 #include "core/linear_algebra.h"
+#include "rig/projection.h"
 #include "solver/least_squares/weighted.h"
 #include "solver/noise.h"
 

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "rig/projection.h"
 #include "tests/calibration/synthetic_boards.h"
 #include "tests/calibration/test_pictures.h"
 

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "core/angle.h"
+#include "rig/projection.h"
 
 namespace sateen::chart_find_test {
 namespace {

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "calibration/lights/light_fit.h"
+#include "rig/projection.h"
 #include "simulation/rigs.h"
 #include "tests/calibration/synthetic_sheets.h"
 

@@ -1,10 +1,12 @@
 #include "calibration/lens/lens.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "calibration/print/markers.h"
 #include "imaging/image_io.h"
+#include "rig/projection.h"
 #include "tests/calibration/synthetic_boards.h"
 #include "tests/calibration/test_pictures.h"
 #include "tests/testing/files.h"

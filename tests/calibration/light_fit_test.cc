@@ -5,6 +5,7 @@
 
 #include <numbers>
 
+#include "rig/projection.h"
 #include "simulation/rigs.h"
 #include "tests/calibration/synthetic_sheets.h"
 

@@ -6,6 +6,7 @@
 
 #include "calibration/lights/light_fit.h"
 #include "calibration/sheet/flatness.h"
+#include "rig/projection.h"
 #include "simulation/rigs.h"
 #include "tests/calibration/synthetic_sheets.h"
 

@@ -4,6 +4,7 @@
 
 #include <functional>
 
+#include "rig/projection.h"
 #include "tests/calibration/synthetic_sheets.h"
 
 namespace sateen::sheet_fault_test {

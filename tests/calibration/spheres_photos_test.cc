@@ -7,6 +7,7 @@
 #include "calibration/spheres/spheres.h"
 #include "core/angle.h"
 #include "imaging/image_io.h"
+#include "rig/projection.h"
 #include "tests/testing/files.h"
 
 namespace sateen::spheres_photos_test {

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "core/angle.h"
+#include "rig/projection.h"
 #include "tests/calibration/synthetic_spheres.h"
 
 namespace sateen::spheres_test {

@@ -6,6 +6,7 @@
 #include "calibration/print/board_find.h"
 #include "core/angle.h"
 #include "rig/camera.h"
+#include "rig/projection.h"
 #include "simulation/random.h"
 
 namespace sateen::testing {

@@ -8,6 +8,7 @@
 #include "core/angle.h"
 #include "imaging/image.h"
 #include "rig/camera.h"
+#include "rig/projection.h"
 
 // Photographs of two chrome spheres, ray by ray through a camera with a lens.
 namespace sateen::testing {

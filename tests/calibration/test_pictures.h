@@ -12,6 +12,7 @@
 #include "imaging/image.h"
 #include "imaging/image_io.h"
 #include "rig/camera.h"
+#include "rig/projection.h"
 #include "simulation/random.h"
 #include "targets/print.h"
 

@@ -8,6 +8,7 @@
 #include "core/file_io.h"
 #include "pipelines/simulate/simulate.h"
 #include "rig/pixel_pitch.h"
+#include "rig/projection.h"
 #include "simulation/rigs.h"
 #include "tests/testing/files.h"
 

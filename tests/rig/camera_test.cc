@@ -8,6 +8,7 @@
 #include <random>
 
 #include "core/angle.h"
+#include "rig/projection.h"
 #include "rig/table_grid.h"
 
 namespace sateen::camera_test {

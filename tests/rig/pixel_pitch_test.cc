@@ -4,6 +4,8 @@
 
 #include <cmath>
 
+#include "rig/projection.h"
+
 namespace sateen::pixel_pitch_test {
 namespace {
 

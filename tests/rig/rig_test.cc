@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
+#include "rig/projection.h"
 #include "tests/testing/files.h"
 
 namespace sateen::rig_test {

@@ -6,6 +6,7 @@
 
 #include "core/angle.h"
 #include "reflectance/specular.h"
+#include "rig/projection.h"
 #include "simulation/optics.h"
 #include "simulation/render.h"
 #include "simulation/rigs.h"

@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "core/angle.h"
+#include "rig/projection.h"
 #include "simulation/random.h"
 #include "simulation/rigs.h"
 #include "simulation/trace.h"

@@ -5,6 +5,7 @@
 
 #include <cmath>
 
+#include "rig/projection.h"
 #include "tests/solver/solver_cases.h"
 
 namespace sateen::gain_rows_test {

@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "core/angle.h"
+#include "rig/projection.h"
 #include "simulation/relief.h"
 #include "simulation/rigs.h"
 

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "core/angle.h"
+#include "rig/projection.h"
 #include "simulation/random.h"
 #include "simulation/rigs.h"
 #include "tests/solver/ladder_cases.h"

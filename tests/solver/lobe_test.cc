@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "reflectance/specular.h"
+#include "rig/projection.h"
 #include "solver/lobe/lobe_search.h"
 #include "tests/solver/ladder_cases.h"
 

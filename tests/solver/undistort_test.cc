@@ -5,6 +5,8 @@
 
 #include <cmath>
 
+#include "rig/projection.h"
+
 namespace sateen::undistort_test {
 namespace {
 

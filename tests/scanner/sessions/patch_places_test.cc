@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "core/angle.h"
+#include "rig/projection.h"
 
 namespace sateen::patch_places_test {
 namespace {

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/sha256.h"
+#include "rig/projection.h"
 #include "tests/scanner/sessions/dataset_files.h"
 
 namespace sateen::session_layout_test {

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "imaging/dng.h"
+#include "rig/projection.h"
 #include "rig/rig.h"
 #include "scanner/capture/capture_session.h"
 #include "simulation/rigs.h"
