@@ -8,10 +8,10 @@
 namespace sateen {
 namespace {
 
-constexpr double kPerParameter = 15.0;  // of chi2, that an explanation must earn
-constexpr double kAlsoMoved = 0.3;      // of the largest gain
+constexpr double kPerParameter = 15.0;  // fall of chi2 that a free unknown must earn
+constexpr double kAlsoMoved = 0.3;      // share of the largest gain
 
-// Frees the lights whose change earns most; false where none earns its parameters.
+// Frees the lights whose change earns most. Returns false where none earns its unknowns.
 bool AddChanges(const std::vector<ChangeGain>& gains, ChangeMask& mask) {
   const auto earned = [&](size_t k) {
     const double moved = mask.moved[k] ? 0.0 : gains[k].moved - 3.0 * kPerParameter;
@@ -64,10 +64,9 @@ Result<ChangeChoice> ChooseChange(const CheckModel& model, const SampleWeights& 
     return tl::unexpected(status.error());
   }
   if (!std::isfinite(least)) {
-    return Fail(
-        ErrorCode::kDegenerate,
-        "no explanation of the sheets has a finite misfit; need readings with noise, as of a "
-        "camera");
+    return Fail(ErrorCode::kDegenerate,
+                "no explanation of the sheets has a finite misfit; need readings with noise, as a "
+                "camera's");
   }
   return best;
 }

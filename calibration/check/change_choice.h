@@ -8,6 +8,7 @@
 
 namespace sateen {
 
+// Change that was chosen.
 struct ChangeChoice {
   ChangeMask mask;
   ChangeFit fit;

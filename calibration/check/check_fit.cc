@@ -3,9 +3,10 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <array>
-#include <cmath>
+#include <limits>
 
 #include "calibration/check/check_unknowns.h"
+#include "core/gauss_newton.h"
 #include "core/linear_algebra.h"
 #include "core/parallel.h"
 
@@ -15,23 +16,23 @@ namespace {
 constexpr int kFitSteps = 5;
 constexpr double kSmallGain = 0.05;  // fall of chi2 below which no further step is made
 
-using LocalNormals = std::vector<std::vector<LocalNormal>>;  // [light][sheet]
+using LocalSystems = std::vector<std::vector<LocalEquations>>;  // [light][sheet]
 
 bool TakesPart(const SampleWeights& weights, size_t light) { return !weights[light].empty(); }
 
-LocalNormals NormalsOf(const CheckModel& model, const SampleWeights& weights,
+LocalSystems SystemsOf(const CheckModel& model, const SampleWeights& weights,
                        const RigChange& change, const std::vector<WantedUnknowns>& wanted,
                        const Task& task) {
-  LocalNormals normals(weights.size());
+  LocalSystems systems(weights.size());
   (void)ParallelFor(
       static_cast<int>(weights.size()), 1, Task{.threads = task.threads}, [&](int begin, int end) {
         for (auto k = static_cast<size_t>(begin); k < static_cast<size_t>(end); ++k) {
           for (size_t s = 0; s < weights[k].size(); ++s) {
-            normals[k].push_back(model.NormalOf(s, k, change, weights[k][s], wanted[k]));
+            model.AddReadings(s, k, change, weights[k][s], wanted[k], systems[k].emplace_back());
           }
         }
       });
-  return normals;
+  return systems;
 }
 
 // Places of the free unknowns in the system of all; -1: not free.
@@ -94,45 +95,37 @@ class UnknownPlaces {
   int count_ = 0;
 };
 
-// Normal equations of (1).
-struct ChangeNormal {
-  Eigen::MatrixXd matrix;
-  Eigen::VectorXd gradient;
-  double chi2 = 0.0;
-
-  ChangeNormal(const UnknownPlaces& places, const LocalNormals& normals, const RigChange& change)
-      : matrix(Eigen::MatrixXd::Zero(places.Count(), places.Count())),
-        gradient(Eigen::VectorXd::Zero(places.Count())) {
-    for (size_t k = 0; k < normals.size(); ++k) {
-      for (size_t s = 0; s < normals[k].size(); ++s) {
-        Add(places, s, k, normals[k][s]);
-      }
-    }
-    places.ForEach([&](int place, size_t s, size_t k, int local) {
-      const PriorTerm prior = PriorOfUnknown(local, UnknownAt(change, s, k, local));
-      matrix(place, place) += prior.precision;
-      gradient[place] += prior.gradient;
-      chi2 += prior.chi2;
-    });
-  }
-
- private:
-  void Add(const UnknownPlaces& places, size_t sheet, size_t light, const LocalNormal& normal) {
-    chi2 += normal.chi2;
-    for (int i = 0; i < kLocal; ++i) {
-      const int row = places.Of(sheet, light, i);
-      if (row < 0) {
-        continue;
-      }
-      gradient[row] += normal.gradient[i];
-      for (int j = 0; j < kLocal; ++j) {
-        if (const int column = places.Of(sheet, light, j); column >= 0) {
-          matrix(row, column) += normal.matrix(i, j);
+// Returns the normal equations of (1).
+NormalEquations<Eigen::Dynamic> EquationsOf(const UnknownPlaces& places,
+                                            const LocalSystems& systems, const RigChange& change) {
+  NormalEquations<Eigen::Dynamic> all(places.Count());
+  for (size_t k = 0; k < systems.size(); ++k) {
+    for (size_t s = 0; s < systems[k].size(); ++s) {
+      const LocalEquations& local = systems[k][s];
+      all.cost += local.cost;
+      for (int i = 0; i < kLocal; ++i) {
+        const int row = places.Of(s, k, i);
+        if (row < 0) {
+          continue;
+        }
+        all.gradient[row] += local.gradient[i];
+        for (int j = 0; j < kLocal; ++j) {
+          if (const int column = places.Of(s, k, j); column >= 0) {
+            all.information(row, column) += local.information(i, j);
+          }
         }
       }
     }
   }
-};
+  Eigen::VectorXd from_mean(places.Count());
+  Eigen::MatrixXd precision = Eigen::MatrixXd::Zero(places.Count(), places.Count());
+  places.ForEach([&](int place, size_t s, size_t k, int local) {
+    from_mean[place] = UnknownAt(change, s, k, local);
+    precision(place, place) = 1.0 / (PriorSdOf(local) * PriorSdOf(local));
+  });
+  all.AddPrior(from_mean, precision);
+  return all;
+}
 
 // Returns the covariance of `Size` unknowns from a place on; zero where they are not free.
 template <int Size>
@@ -150,11 +143,11 @@ struct FollowedStep {
 
 // Eliminates the flux from the unknowns [At, At + Size).
 template <int At, int Size>
-FollowedStep<Size> StepWithFlux(const LocalNormal& light) {
-  const Eigen::Matrix3d flux = light.matrix.block<3, 3>(kFluxAt, kFluxAt).inverse();
-  const Eigen::Matrix<double, 3, Size> with_flux = light.matrix.block<3, Size>(kFluxAt, At);
+FollowedStep<Size> StepWithFlux(const LocalEquations& light) {
+  const Eigen::Matrix3d flux = light.information.block<3, 3>(kFluxAt, kFluxAt).inverse();
+  const Eigen::Matrix<double, 3, Size> with_flux = light.information.block<3, Size>(kFluxAt, At);
   const Eigen::Matrix<double, Size, Size> left =
-      light.matrix.block<Size, Size>(At, At) - with_flux.transpose() * flux * with_flux;
+      light.information.block<Size, Size>(At, At) - with_flux.transpose() * flux * with_flux;
   const Eigen::Matrix<double, Size, 1> gradient =
       light.gradient.segment<Size>(At) - with_flux.transpose() * flux * light.gradient.head<3>();
   const Eigen::Matrix<double, Size, Size> covariance = left.inverse();
@@ -170,21 +163,26 @@ ChangeFit FitChange(const CheckModel& model, const SampleWeights& weights, const
   for (size_t k = 0; k < weights.size(); ++k) {
     wanted.push_back(model.WantedOf(k, mask.moved[k], mask.turned[k], mask.camera, mask.sheets));
   }
-  ChangeFit fit{.change = start};
-  Eigen::MatrixXd covariance;
-  for (int step = 0;; ++step) {
-    const ChangeNormal normal(places, NormalsOf(model, weights, fit.change, wanted, task),
-                              fit.change);
-    fit.chi2 = normal.chi2;
-    const Eigen::VectorXd by = SolveSymmetric(normal.matrix, normal.gradient);
-    if (step == kFitSteps || normal.gradient.dot(by) < kSmallGain) {
-      covariance = InverseOfSymmetric(normal.matrix);
-      break;
-    }
-    places.ForEach([&](int place, size_t s, size_t k, int local) {
-      UnknownAt(fit.change, s, k, local) += by[place];
-    });
+  const auto descent = MinimizeSquares<Eigen::Dynamic>(
+      start,
+      [&](const RigChange& at) {
+        return EquationsOf(places, SystemsOf(model, weights, at, wanted, task), at);
+      },
+      [&](RigChange at, const Eigen::VectorXd& step) {
+        places.ForEach([&](int place, size_t s, size_t k, int local) {
+          UnknownAt(at, s, k, local) += step[place];
+        });
+        return at;
+      },
+      {.rule = StepRule::kFull,
+       .max_iterations = kFitSteps,
+       .min_relative_fall = 0.0,
+       .min_gain = kSmallGain});
+  ChangeFit fit{.change = descent.state, .chi2 = descent.equations.cost};
+  if (descent.end == GaussNewtonEnd::kNotFinite) {
+    fit.chi2 = std::numeric_limits<double>::infinity();
   }
+  const Eigen::MatrixXd covariance = InverseOfSymmetric(descent.equations.information);
   for (size_t k = 0; k < weights.size(); ++k) {
     fit.flux.push_back(CovarianceBlock<3>(covariance, places.Of(0, k, kFluxAt)));
     fit.moved_mm2.push_back(CovarianceBlock<3>(covariance, places.Of(0, k, kMovedAt)));
@@ -201,16 +199,18 @@ std::vector<ChangeGain> GainsOf(const CheckModel& model, const SampleWeights& we
   for (size_t k = 0; k < weights.size(); ++k) {
     wanted.push_back(model.WantedOf(k, true, true, false, false));
   }
-  const LocalNormals normals = NormalsOf(model, weights, fit.change, wanted, task);
-  for (size_t k = 0; k < normals.size(); ++k) {
-    if (normals[k].empty()) {
+  const LocalSystems systems = SystemsOf(model, weights, fit.change, wanted, task);
+  for (size_t k = 0; k < systems.size(); ++k) {
+    if (!TakesPart(weights, k)) {
       continue;
     }
-    LocalNormal sum;
-    for (const LocalNormal& normal : normals[k]) {
-      sum += normal;
+    LocalEquations sum;
+    for (const LocalEquations& one : systems[k]) {
+      sum.information += one.information;
+      sum.gradient += one.gradient;
+      sum.cost += one.cost;
     }
-    sum.AddPriorsOf(k, fit.change);
+    AddPriorsOf(k, fit.change, sum);
     const FollowedStep<3> moved = StepWithFlux<kMovedAt, 3>(sum);
     const FollowedStep<2> turned = StepWithFlux<kTurnedAt, 2>(sum);
     gains[k] = {moved.gain, turned.gain, moved.covariance};

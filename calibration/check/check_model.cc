@@ -89,10 +89,9 @@ std::vector<double> CheckModel::Residuals(size_t sheet, size_t light,
   return residuals;
 }
 
-LocalNormal CheckModel::NormalOf(size_t sheet, size_t light, const RigChange& change,
-                                 const std::vector<double>& weights,
-                                 const WantedUnknowns& wanted) const {
-  LocalNormal normal;
+void CheckModel::AddReadings(size_t sheet, size_t light, const RigChange& change,
+                             const std::vector<double>& weights, const WantedUnknowns& wanted,
+                             LocalEquations& equations) const {
   const std::vector<SheetSample>& samples = sheets_[sheet].samples[light];
   const Light now = ChangedLight(rig_.lights[light], change.lights[light]);
   // Rig with one unknown a step higher or lower, two per unknown that is wanted.
@@ -131,11 +130,10 @@ LocalNormal CheckModel::NormalOf(size_t sheet, size_t light, const RigChange& ch
                                    .matrix();
     }
     const Eigen::Vector3d off = ((samples[j].radiance_rgb - is).array() * scale).matrix();
-    normal.matrix.noalias() += weights[j] * jacobian.transpose() * jacobian;
-    normal.gradient.noalias() += weights[j] * jacobian.transpose() * off;
-    normal.chi2 += weights[j] * off.squaredNorm();
+    equations.information.noalias() += weights[j] * jacobian.transpose() * jacobian;
+    equations.gradient.noalias() += weights[j] * jacobian.transpose() * off;
+    equations.cost += weights[j] * off.squaredNorm();
   }
-  return normal;
 }
 
 WantedUnknowns CheckModel::WantedOf(size_t light, bool moved, bool turned, bool camera,

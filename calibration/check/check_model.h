@@ -41,11 +41,11 @@ class CheckModel {
   [[nodiscard]] WantedUnknowns WantedOf(size_t light, bool moved, bool turned, bool camera,
                                         bool sheet) const;
 
-  // Returns the normal equations of (1), each sample times its weight; derivatives by unknowns that
-  // are not wanted are 0.
-  [[nodiscard]] LocalNormal NormalOf(size_t sheet, size_t light, const RigChange& change,
-                                     const std::vector<double>& weights,
-                                     const WantedUnknowns& wanted) const;
+  // Adds (1) of all samples, each times its weight. Derivatives by unknowns that are not wanted are
+  // taken as 0.
+  void AddReadings(size_t sheet, size_t light, const RigChange& change,
+                   const std::vector<double>& weights, const WantedUnknowns& wanted,
+                   LocalEquations& equations) const;
 
   // Largest height and slope of a sheet against where it was said to lie.
   struct Lie {

@@ -1,6 +1,5 @@
 #include "calibration/check/check_settle.h"
 
-#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -8,7 +7,7 @@
 
 #include "calibration/check/check_unknowns.h"
 #include "calibration/fit/robust_spread.h"
-#include "core/linear_algebra.h"
+#include "core/gauss_newton.h"
 #include "core/parallel.h"
 
 namespace sateen {
@@ -54,22 +53,26 @@ struct SettleResiduals {
   }
 };
 
-// Moves one light by one step of Gauss and Newton's method.
-void StepLight(const CheckModel& model, size_t light, const SheetWeights& weights,
-               RigChange& change) {
+// Returns the normal equations of one light's own unknowns with Cauchy's weights.
+NormalEquations<kOfLight> SettleEquations(const CheckModel& model, size_t light,
+                                          const RigChange& change) {
+  const SettleResiduals residuals(model, light, change);
+  const double variance = residuals.spread * residuals.spread;
+  const SheetWeights weights = residuals.Weights([&](double worst) {
+    const double scaled = worst / kSettleLossScale;
+    return 1.0 / (variance * (1.0 + scaled * scaled));
+  });
+  LocalEquations all;
   const WantedUnknowns wanted = model.WantedOf(light, true, true, false, false);
-  LocalNormal sum;
   for (size_t s = 0; s < weights.size(); ++s) {
-    sum += model.NormalOf(s, light, change, weights[s], wanted);
+    model.AddReadings(s, light, change, weights[s], wanted, all);
   }
-  sum.AddPriorsOf(light, change);
-  const Eigen::Matrix<double, kOfLight, kOfLight> matrix =
-      sum.matrix.topLeftCorner<kOfLight, kOfLight>();
-  const Eigen::Matrix<double, kOfLight, 1> by =
-      SolveSymmetric(matrix, Eigen::Matrix<double, kOfLight, 1>(sum.gradient.head<kOfLight>()));
-  for (int i = 0; i < kOfLight; ++i) {
-    UnknownAt(change, 0, light, i) += by[i];
-  }
+  AddPriorsOf(light, change, all);
+  NormalEquations<kOfLight> own;
+  own.information = all.information.topLeftCorner<kOfLight, kOfLight>();
+  own.gradient = all.gradient.head<kOfLight>();
+  own.cost = all.cost;
+  return own;
 }
 
 // Returns V_6 / V_1 of (1), at least 1, from the green residuals.
@@ -111,17 +114,19 @@ double CorrelationOf(const CheckModel& model, size_t light, const SettleResidual
 }  // namespace
 
 SettledLight SettleLight(const CheckModel& model, size_t light) {
-  RigChange change = model.Unchanged();
-  SettleResiduals residuals(model, light, change);
-  for (int step = 0; step < kSettleSteps; ++step) {
-    const double variance = residuals.spread * residuals.spread;
-    const SheetWeights weights = residuals.Weights([&](double worst) {
-      const double scaled = worst / kSettleLossScale;
-      return 1.0 / (variance * (1.0 + scaled * scaled));
-    });
-    StepLight(model, light, weights, change);
-    residuals = SettleResiduals(model, light, change);
-  }
+  // The weights follow the residuals, so that the cost of one step is not that of the next.
+  const RigChange change =
+      MinimizeSquares<kOfLight>(
+          model.Unchanged(), [&](const RigChange& at) { return SettleEquations(model, light, at); },
+          [&](RigChange at, const Unknowns<kOfLight>& step) {
+            for (int i = 0; i < kOfLight; ++i) {
+              UnknownAt(at, 0, light, i) += step[i];
+            }
+            return at;
+          },
+          {.rule = StepRule::kFull, .max_iterations = kSettleSteps, .min_relative_fall = 0.0})
+          .state;
+  const SettleResiduals residuals(model, light, change);
   const double variance =
       residuals.spread * residuals.spread * CorrelationOf(model, light, residuals);
   return {.change = change.lights[light], .weights = residuals.Weights([&](double worst) {

@@ -22,6 +22,8 @@ auto& UnknownOf(Change& change, size_t sheet, size_t light, int local) {
                           : change.sheets[sheet][local - kSheetAt];
 }
 
+}  // namespace
+
 double PriorSdOf(int local) {
   if (local < kMovedAt) {
     return kFluxPrior;
@@ -38,14 +40,6 @@ double PriorSdOf(int local) {
   return kSheetPriorMm;
 }
 
-}  // namespace
-
-PriorTerm PriorOfUnknown(int local, double value) {
-  const double sd = PriorSdOf(local);
-  const double precision = 1.0 / (sd * sd);
-  return {precision, -precision * value, precision * value * value};
-}
-
 double StepOfUnknown(int local) {
   const bool is_angle = (local >= kTurnedAt && local < kCameraAt) || local == kSheetAt - 1;
   return is_angle ? kDifferenceRad : kDifferenceMm;
@@ -59,20 +53,14 @@ double UnknownAt(const RigChange& change, size_t sheet, size_t light, int local)
   return UnknownOf(change, sheet, light, local);
 }
 
-LocalNormal& LocalNormal::operator+=(const LocalNormal& other) {
-  matrix += other.matrix;
-  gradient += other.gradient;
-  chi2 += other.chi2;
-  return *this;
-}
-
-void LocalNormal::AddPriorsOf(size_t light, const RigChange& change) {
+void AddPriorsOf(size_t light, const RigChange& change, LocalEquations& equations) {
+  Unknowns<kLocal> from_mean = Unknowns<kLocal>::Zero();
+  UnknownsMatrix<kLocal> precision = UnknownsMatrix<kLocal>::Zero();
   for (int i = 0; i < kOfLight; ++i) {
-    const PriorTerm prior = PriorOfUnknown(i, UnknownAt(change, 0, light, i));
-    matrix(i, i) += prior.precision;
-    gradient[i] += prior.gradient;
-    chi2 += prior.chi2;
+    from_mean[i] = UnknownAt(change, 0, light, i);
+    precision(i, i) = 1.0 / (PriorSdOf(i) * PriorSdOf(i));
   }
+  equations.AddPrior(from_mean, precision);
 }
 
 }  // namespace sateen

@@ -5,6 +5,7 @@
 
 #include "calibration/check/rig_change.h"
 #include "core/angle.h"
+#include "core/gauss_newton.h"
 
 // Unknowns on which the readings of one light on one sheet depend: their order, priors and steps.
 namespace sateen {
@@ -25,15 +26,8 @@ inline constexpr double kCameraPriorMm = 50.0;
 inline constexpr double kCameraPriorRad = 5.0 * kRadPerDeg;
 inline constexpr double kSheetPriorMm = 5.0;
 
-// Term (x / s)^2 of an unknown x whose prior has the standard deviation s.
-struct PriorTerm {
-  double precision = 0.0;  // 1 / s^2: its share in the normal matrix
-  double gradient = 0.0;   // -x / s^2: its share in the right side
-  double chi2 = 0.0;
-};
-
-/// Returns the prior's term of unknown `local` at this value.
-[[nodiscard]] PriorTerm PriorOfUnknown(int local, double value);
+/// Returns the standard deviation of the prior of unknown `local`, in the unknown's unit.
+[[nodiscard]] double PriorSdOf(int local);
 
 /// Returns the step of central differences by unknown `local`: 0.01 mm or 1e-5 rad.
 [[nodiscard]] double StepOfUnknown(int local);
@@ -42,16 +36,11 @@ struct PriorTerm {
 [[nodiscard]] double& UnknownAt(RigChange& change, size_t sheet, size_t light, int local);
 [[nodiscard]] double UnknownAt(const RigChange& change, size_t sheet, size_t light, int local);
 
-// Normal equations A x = b of the readings of one light on one sheet.
-struct LocalNormal {
-  Eigen::Matrix<double, kLocal, kLocal> matrix = Eigen::Matrix<double, kLocal, kLocal>::Zero();
-  Eigen::Matrix<double, kLocal, 1> gradient = Eigen::Matrix<double, kLocal, 1>::Zero();  // b
-  double chi2 = 0.0;
+// Normal equations of readings of one light on one sheet.
+using LocalEquations = NormalEquations<kLocal>;
 
-  LocalNormal& operator+=(const LocalNormal& other);
-  // Adds the priors of the light's own unknowns, at their values in `change`.
-  void AddPriorsOf(size_t light, const RigChange& change);
-};
+// Adds the priors of the light's own unknowns, at their values in `change`.
+void AddPriorsOf(size_t light, const RigChange& change, LocalEquations& equations);
 
 // Unknowns by which derivatives are needed.
 using WantedUnknowns = std::array<bool, kLocal>;

@@ -11,12 +11,13 @@
 #include "calibration/check/check_settle.h"
 #include "calibration/check/lit_from.h"
 #include "core/angle.h"
+#include "core/statistics.h"
 
 namespace sateen {
 namespace {
 
 constexpr size_t kFewestSamples = 50;
-constexpr size_t kFewestForCommon = 3;  // lights, for a flux of all
+constexpr size_t kFewestForCommon = 3;  // lights for a common flux
 
 Status InRange(const char* name, double value, double above, double below) {
   return value > above && value < below
@@ -31,7 +32,7 @@ double WorstDirectionChange(const std::vector<SheetSample>& samples,
   for (const SheetSample& sample : samples) {
     const Eigen::Vector3d was = position_mm - sample.point_mm;
     const Eigen::Vector3d is = was + moved_mm;
-    worst = std::max(worst, std::atan2(was.cross(is).norm(), was.dot(is)));
+    worst = std::max(worst, AngleBetweenRad(was, is));
   }
   return worst;
 }
@@ -84,8 +85,7 @@ class Checker {
       }
       count = logs.size();
       std::ranges::sort(logs);
-      const double median = 0.5 * (logs[(count - 1) / 2] + logs[count / 2]);
-      common_[c] = count < kFewestForCommon ? 0.0 : median;
+      common_[c] = count < kFewestForCommon ? 0.0 : InterpolatedQuantile(logs, 0.5);
     }
     check_.common_flux = common_.array().exp();
     check_.is_common_flux_off = (check_.common_flux.array() - 1.0).abs().maxCoeff() >
@@ -120,8 +120,7 @@ class Checker {
     light.is_unclear = options_.significance * light.direction_sd_deg > options_.max_direction_deg;
   }
 
-  // Today's irradiance over the rig's, flux apart, where it is farthest from its mean: what a
-  // turned axis does.
+  // Returns the largest change of irradiance over the field by the turn of the axis, from its mean.
   [[nodiscard]] double UnevenByTurning(size_t k) const {
     RigChange without = fit_.change;
     without.lights[k].turned_rad.setZero();
@@ -150,7 +149,7 @@ class Checker {
     check_.holds = check_.holds && light.verdict == LightVerdict::kHolds;
   }
 
-  // A pixel that looks d to the side sees a light as one that moved d to the other.
+  // Judges the camera: a pixel that looks d to one side sees a light as moved by d to the other.
   void JudgeCamera() {
     CameraCheck& camera = check_.camera;
     if (mask_.camera) {
@@ -168,8 +167,7 @@ class Checker {
               camera.moved_mm + fit_.change.camera[3] * Eigen::Vector3d::UnitZ().cross(ray) -
               ray * (camera.moved_mm.dot(sample.normal) / ray.dot(sample.normal));
           camera.direction_deg =
-              std::max(camera.direction_deg,
-                       std::atan2(at.cross(at - by).norm(), at.dot(at - by)) * kDegPerRad);
+              std::max(camera.direction_deg, AngleBetweenRad(at, at - by) * kDegPerRad);
         }
       }
     }
@@ -298,9 +296,10 @@ Result<RigCheck> CheckRig(const Rig& rig, const std::vector<SheetReadings>& shee
     check.holds = check.holds && used[k];
   }
   if (std::ranges::count(used, true) == 0) {
-    return Fail(ErrorCode::kDegenerate,
-                "no light has a frame that can be checked: all are dark, saturated or swapped; "
-                "did the lights come on, and is this the rig's sheet?");
+    return Fail(
+        ErrorCode::kDegenerate,
+        "no light has a frame that can be checked: all are dark, saturated or swapped; did the "
+        "lights come on, and is this the rig's sheet?");
   }
   if (Status status = Checker(rig, sheets, options, used, task, check).Run(); !status) {
     return tl::unexpected(status.error());

@@ -3,15 +3,15 @@
 #include <cmath>
 #include <limits>
 
-#include "calibration/fit/robust_spread.h"
+#include "core/statistics.h"
 
 namespace sateen {
 namespace {
 
-constexpr double kMuchBetter = 0.5;  // times the unevenness under its own light
+constexpr double kMuchBetter = 0.5;  // times the unevenness by its own light
 
-// How uneven today's picture is over what a light should show, both in the median sense; the lower
-// the better the pattern fits, whatever its brightness.
+// Returns the median deviation of today's readings over those predicted for a light, after a common
+// factor: the lower, the better the pattern fits.
 double Unevenness(const std::vector<SheetSample>& samples, const Light& light) {
   std::vector<double> ratios;
   ratios.reserve(samples.size());

@@ -8,8 +8,8 @@
 
 namespace sateen {
 
-// The light of which the samples of light k show the pattern, where that fits twice as well as its
-// own, whatever the brightness: frames or cables are swapped. Nothing where its own does.
+// Returns the light whose pattern the samples of light k show, if it fits twice as well as k's own,
+// whatever the brightness: frames or cables are swapped. Returns nothing otherwise.
 [[nodiscard]] std::optional<size_t> LitFrom(const Lights& lights,
                                             const std::vector<SheetSample>& samples, size_t k);
 

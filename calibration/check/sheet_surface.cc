@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "calibration/fit/robust_spread.h"
 #include "core/angle.h"
+#include "core/statistics.h"
 
 namespace sateen {
 namespace {
@@ -16,7 +16,7 @@ constexpr double kSpot = 0.02;
 constexpr double kFoldRad = 0.5 * kRadPerDeg;
 constexpr double kSignificant = 5.0;
 
-// The normal equations of (1) of one block.
+// Normal equations (1) of one block.
 struct SurfaceSystem {
   Eigen::Matrix3d matrix = Eigen::Matrix3d::Zero();
   Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
@@ -54,7 +54,7 @@ SheetSurface SurfaceOf(const SheetReadings& sheet, const Lights& lights,
   }
   struct Found {
     Eigen::Vector3d is;
-    Eigen::Vector3d sd;  // for noise of 1
+    Eigen::Vector3d sd;  // standard deviations for noise of 1
   };
   std::vector<Found> found;
   std::vector<double> left;

@@ -7,30 +7,32 @@
 
 namespace sateen {
 
-// How a sheet lies and what is on it.
+// How a sheet lies, and its spots and folds.
 struct SheetSurface {
-  // Against where it was said to lie, where that explains it: steepest slope over the field, and
-  // highest place.
+  // Largest slope and height against where the sheet was said to lie.
   double slope_deg = 0.0;
   double height_mm = 0.0;
-  // Shares of the blocks: darker or brighter than paper under all lights (spots, no paper);
-  // bright on the side of the lights (folds, edges).
+  // Shares of the blocks: darker or brighter than paper under all lights (spots, no paper); bright
+  // towards the lights (folds, edges).
   double spots = 0.0;
   double folds = 0.0;
-  double steepest_deg = 0.0;  // of the folds
-  bool is_off = false;        // beyond what the check allows
+  double steepest_deg = 0.0;  // largest slope of the folds
+  bool is_off = false;        // true: beyond the limits of the check
 };
 
-/// Albedo and slope of each block of a sheet from all lights, what a change already explains taken off:
+// Returns the green radiance of a sample that the change predicts; 0 for a light without a part.
+using ExpectedGreen = std::function<double(size_t light, const SheetSample& sample)>;
+
+/// Finds spots and folds: fits albedo a_j and slope (p_j, q_j) of each block j to all lights k,
 ///
 ///     i_jk / m_jk - 1 = a_j - (p_j l_u + q_j l_v) / l_n + noise,       k = 1..K               (1)
 ///
-/// in least squares over the lights with a sample there, at least four; m what is expected in
-/// green, 0 for a light that takes no part; l towards light k in the sheet's frame. A spot has |a_j| above 2 %, a fold a slope above
-/// 0.5 degrees, both above five standard deviations, from what (1) leaves over the whole sheet.
+/// by least squares over at least four lights with a sample there. m is the expected green
+/// radiance, l the direction of light k in the sheet's frame. A spot has |a_j| above 2 %, a fold a
+/// slope above 0.5 degrees, both above five standard deviations. The noise is that of the residuals
+/// of (1) over the whole sheet. Nothing is found with fewer than four lights.
 ///
-/// height, slope, is_off are left to the caller. Nothing is found with fewer than four lights.
-using ExpectedGreen = std::function<double(size_t light, const SheetSample& sample)>;
+/// Returns  spots, folds and steepest_deg; the caller fills in the other fields
 [[nodiscard]] SheetSurface SurfaceOf(const SheetReadings& sheet, const Lights& lights,
                                      const ExpectedGreen& expected);
 

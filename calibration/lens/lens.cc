@@ -6,10 +6,11 @@
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core.hpp>
 
-#include "calibration/fit/robust_spread.h"
+#include "calibration/lens/lens_check.h"
 #include "calibration/print/plane_map.h"
 #include "calibration/print/pose_solve.h"
 #include "core/angle.h"
+#include "core/statistics.h"
 #include "rig/projection.h"
 
 namespace sateen {
@@ -17,11 +18,11 @@ namespace {
 
 constexpr size_t kFewestViews = 3;
 constexpr size_t kFewestCornersOfView = 6;
-constexpr double kNoOutlierPx = 0.05;  // an error below is none, whatever the median
+constexpr double kNoOutlierPx = 0.05;  // error below which no view is an outlier
 constexpr double kAlike = 5.0 * kRadPerDeg;
 constexpr double kUnknownFocal = 0.05;  // relative standard deviation
 
-// What OpenCV says of one set of views.
+// Lens of one set of views, as OpenCV fits it.
 struct RawLensFit {
   Camera camera;
   std::vector<double> sd;
@@ -80,7 +81,7 @@ Result<RawLensFit> RawFit(const std::vector<BoardView>& views, const ViewSet& se
   return fit;
 }
 
-// Fits, and leaves out the worst view as long as it is an outlier.
+// Fits the views of `set`, and leaves out the worst as long as it is an outlier.
 Result<RawLensFit> FitWithoutOutliers(const std::vector<BoardView>& views, ViewSet& set,
                                       const LensFitOptions& options, LensFit& report) {
   const size_t most = set.size() / 3;
@@ -112,8 +113,8 @@ Result<RawLensFit> FitWithoutOutliers(const std::vector<BoardView>& views, ViewS
   }
 }
 
-// Where the lens puts what a pinhole camera of the same matrix has at the corners of the image, less
-// that; nothing where its distortion turns back before.
+// Returns by how much distortion displaces points that a pinhole camera of the same matrix has at
+// the corners of the image; nothing where the distortion folds before it reaches them.
 std::optional<Eigen::Matrix<double, 2, 4>> CornerDisplacements(const Camera& lens) {
   Eigen::Matrix<double, 2, 4> displacements;
   for (int i = 0; i < 4; ++i) {
@@ -128,7 +129,7 @@ std::optional<Eigen::Matrix<double, 2, 4>> CornerDisplacements(const Camera& len
   return displacements;
 }
 
-// Standard deviation by the jackknife, of lenses each without one of as many parts of the views.
+// Returns the standard deviation by the jackknife, from lenses each fitted without one part.
 double CornerSdPx(const std::vector<Camera>& lenses) {
   std::vector<Eigen::Matrix<double, 2, 4>> displacements;
   Eigen::Matrix<double, 2, 4> mean = Eigen::Matrix<double, 2, 4>::Zero();
@@ -148,7 +149,7 @@ double CornerSdPx(const std::vector<Camera>& lenses) {
   return std::sqrt(variance.maxCoeff());
 }
 
-// Errors of views by lenses fitted without them, and what these lenses differ by.
+// Fills in the errors of views by lenses fitted without them, and how these lenses differ.
 Status HoldOut(const std::vector<BoardView>& views, const ViewSet& set, size_t folds,
                LensFit& report) {
   folds = std::min(folds, set.size());
@@ -185,7 +186,7 @@ Status HoldOut(const std::vector<BoardView>& views, const ViewSet& set, size_t f
   return {};
 }
 
-// The views that can be used at all; the reports of the others say why not.
+// Returns the views that can be used; the reports of the others say why not.
 ViewSet UsableViews(const std::vector<BoardView>& views, LensFit& report) {
   ViewSet set;
   set.reserve(views.size());

@@ -1,23 +1,26 @@
+#include "calibration/lens/lens_check.h"
+
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 
-#include "calibration/lens/lens.h"
 #include "core/angle.h"
+#include "core/statistics.h"
 
 namespace sateen {
 namespace {
 
 constexpr size_t kEnoughViews = 8;
 constexpr double kEnoughSpread = 30.0 * kRadPerDeg;
-constexpr double kEnoughCovered = 0.7;  // of the cells
+constexpr double kEnoughCovered = 0.7;  // share of the cells
 constexpr double kFocalSd = 2e-3;       // relative
 constexpr double kCornerSdPx = 1.0;
 constexpr double kHeldOutRatio = 1.5;
-constexpr double kBlurRatio = 2.0;  // of the median
-constexpr double kSharpPx = 1.2;    // an edge width that is never called blurred
+constexpr double kBlurRatio = 2.0;  // times the median
+constexpr double kSharpPx = 1.2;    // edge width that is never called blurred
 
 void WarnOfBlur(const LensFit& fit, std::vector<std::string>& warnings) {
   std::vector<double> widths_px;
@@ -26,21 +29,21 @@ void WarnOfBlur(const LensFit& fit, std::vector<std::string>& warnings) {
       widths_px.push_back(view.edge_px);
     }
   }
-  const auto middle = widths_px.begin() + static_cast<std::ptrdiff_t>(widths_px.size() / 2);
-  std::nth_element(widths_px.begin(), middle, widths_px.end());
-  const double limit_px = std::max(kBlurRatio * *middle, kSharpPx);
+  const double median_px = Median(std::move(widths_px));
+  const double limit_px = std::max(kBlurRatio * median_px, kSharpPx);
   for (const LensViewReport& view : fit.views) {
     if (view.left_out.empty() && view.edge_px > limit_px) {
-      warnings.push_back(fmt::format(
-          "{} is blurred: its edges are {:.1f} px wide, those of half the views {:.1f} px or less; "
-          "did board or camera move, or was the board out of focus?",
-          view.name, view.edge_px, *middle));
+      warnings.push_back(
+          fmt::format("{} is blurred: its edges are {:.1f} px wide, those of the median view "
+                      "{:.1f} px; did the "
+                      "board or the camera move, or was the board out of focus?",
+                      view.name, view.edge_px, median_px));
     }
   }
 }
 
-// A term is small against its standard deviation wherever the lens has little of it; what counts is what
-// that leaves open in the picture.
+// Warns where the displacement in the corners is not known. A term may be small against its
+// standard deviation because the lens has little of it; only its effect in the picture counts.
 void WarnOfDistortion(const LensFit& fit, std::vector<std::string>& warnings) {
   if (!(fit.corner_sd_px > kCornerSdPx)) {
     return;
@@ -68,8 +71,7 @@ double SpreadOfTiltsRad(const LensFit& fit) {
   double spread = 0.0;
   for (const LensViewReport& a : fit.views) {
     for (const LensViewReport& b : fit.views) {
-      spread = std::max(spread, std::atan2(a.normal_in_camera.cross(b.normal_in_camera).norm(),
-                                           a.normal_in_camera.dot(b.normal_in_camera)));
+      spread = std::max(spread, AngleBetweenRad(a.normal_in_camera, b.normal_in_camera));
     }
   }
   return spread;

@@ -5,14 +5,15 @@
 #include <utility>
 
 #include "core/check.h"
+#include "core/statistics.h"
 
 namespace sateen {
 namespace {
 
-constexpr double kPoseStep = 1e-6;  // of numeric derivatives, rad or mm
+constexpr double kPoseStep = 1e-6;  // of central differences, rad or mm
 
-// Derivative of the camera's small rotation and position in the table frame by w and d of the
-// pose solved for.
+// Returns the derivatives of the camera's small rotation and position in the table frame by w and d
+// of the pose that was solved for.
 Matrix6d TableJacobian(const Eigen::Isometry3d& camera_from_board) {
   const auto table_from_camera = [&](const Eigen::Matrix<double, 6, 1>& step) {
     return CameraFromTable(Moved(camera_from_board, step)).inverse();
@@ -62,14 +63,13 @@ Result<BoardView> MeanView(const std::vector<BoardView>& views) {
       sum->second.first += view.corners_px[i];
       ++sum->second.second;
     }
-    const auto middle = off_px.begin() + static_cast<std::ptrdiff_t>(off_px.size() / 2);
-    std::nth_element(off_px.begin(), middle, off_px.end());
-    if (!off_px.empty() && *middle > kStillPx) {
+    const double median_px = off_px.empty() ? 0.0 : Median(std::move(off_px));
+    if (median_px > kStillPx) {
       return Fail(
           ErrorCode::kBadData,
-          "{}: its corners are {:.1f} px from those of the photographs before it; the board "
-          "or the camera moved: use photographs of one board lying still, or only one",
-          view.name, *middle);
+          "{}: its corners are {:.1f} px from those of the photographs before it; the board or the "
+          "camera moved: use photographs of one board that lies still, or one photograph",
+          view.name, median_px);
     }
   }
   BoardView mean = views[0];

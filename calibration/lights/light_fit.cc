@@ -1,6 +1,5 @@
 #include "calibration/lights/light_fit.h"
 
-#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 
@@ -8,6 +7,7 @@
 #include "calibration/lights/field_fit.h"
 #include "calibration/lights/light_residuals.h"
 #include "calibration/lights/robust_fit.h"
+#include "core/statistics.h"
 
 namespace sateen {
 namespace {
@@ -16,7 +16,7 @@ constexpr size_t kFewestOfALight = 50;
 constexpr size_t kHeldOutEvery = 5;
 constexpr double kExplained = 1.1;  // times the noise
 constexpr double kStartAnisotropy = 1.0;
-constexpr double kStartRoughness = 100.0;  // of a field
+constexpr double kStartRoughness = 100.0;  // lambda of a field
 
 Eigen::Vector3d MiddleOf(const std::vector<SheetSample>& samples) {
   Eigen::Vector3d middle = Eigen::Vector3d::Zero();
@@ -26,8 +26,9 @@ Eigen::Vector3d MiddleOf(const std::vector<SheetSample>& samples) {
   return middle;
 }
 
-// Relative, of what a light sends to a point: d ln e = d ln phi - 2 l . ds / d. What position and flux owe to
-// each other, which a flat sheet hardly tells apart, is in the covariance of a fit.
+// Returns the relative standard deviation of the irradiance at a point, from the covariance of
+// position and log flux: d ln e = d ln phi - 2 l . ds / d. A flat sheet hardly tells the two apart,
+// but well what they send together.
 double IrradianceSd(const Eigen::MatrixXd& covariance, const Eigen::Vector3d& position_mm,
                     const Eigen::Vector3d& point_mm) {
   const Eigen::Vector3d d = position_mm - point_mm;
@@ -42,7 +43,7 @@ double IrradianceSd(const Eigen::MatrixXd& covariance, const Eigen::Vector3d& po
   return std::sqrt(variance);
 }
 
-// A rough light on a higher rung than it has: an LED that faces the middle of the samples.
+// Puts a rough light on a rung: an LED without an axis faces the middle of the samples.
 Light OnRung(const Light& rough, LightModel model, const std::vector<SheetSample>& samples) {
   Light light = rough;
   if (IsLed(model) && !IsLed(rough.model)) {
@@ -53,7 +54,7 @@ Light OnRung(const Light& rough, LightModel model, const std::vector<SheetSample
   return light;
 }
 
-// The flux that explains the samples' median best, for a start in the right units.
+// Scales the flux to explain the median of the samples, for a start in the right units.
 void ScaleFlux(const std::vector<SheetSample>& samples, double albedo, Light& light) {
   for (Eigen::Index c = 0; c < 3; ++c) {
     std::vector<double> ratios;
@@ -77,12 +78,13 @@ Status CheckSamples(const std::vector<SheetSample>& samples) {
   }
   const bool all_dark = std::ranges::all_of(
       samples, [](const SheetSample& s) { return s.radiance_rgb.maxCoeff() <= 0.0; });
-  return all_dark ? Status(Fail(ErrorCode::kDegenerate, "the sheet is dark: the light never lit"))
-                  : Status();
+  return all_dark
+             ? Status(Fail(ErrorCode::kDegenerate, "the sheet is dark: the light was never on"))
+             : Status();
 }
 
-// Where the fit of a rung starts: from the rung below; the field from the ruler again, because an LED that
-// fits badly may have gone far astray.
+// Returns where the fit of a rung starts: from the rung below. A field starts from the ruler again,
+// because an LED that fits badly may have gone far astray.
 Light StartOf(LightModel model, const Light& below, const Light& rough,
               const std::vector<SheetSample>& samples, double albedo) {
   Light from = OnRung(model == LightModel::kLedField ? rough : below, model, samples);
@@ -90,7 +92,7 @@ Light StartOf(LightModel model, const Light& below, const Light& rough,
   return from;
 }
 
-// The samples' indices, and which of them judge the rungs.
+// Indices of the samples, and which of them judge the rungs.
 struct Split {
   std::vector<size_t> all;
   std::vector<size_t> fitted;
@@ -104,13 +106,14 @@ struct Split {
   }
 };
 
-// A rung and what fitting it robustly came to.
+// Robust fit of a rung.
 struct Fitted {
   RobustFit fit;
   double roughness_weight = 0.0;
 };
 
-// Fits any rung to samples of these indices; the field's roughness by `held_out`, where there are any.
+// Fits any rung to the samples of these indices. Held-out samples, if there are any, choose the
+// roughness of a field.
 Result<Fitted> FitRung(const LightResiduals& residuals, LightModel model, const Light& start,
                        const std::vector<size_t>& indices, const std::vector<size_t>& held_out,
                        double roughness_weight, const LightFitOptions& options) {
@@ -135,7 +138,7 @@ Result<Fitted> FitRung(const LightResiduals& residuals, LightModel model, const 
                 .roughness_weight = field->roughness_weight};
 }
 
-// One rung fitted to all samples but the held-out ones, and judged by those.
+// Fits one rung to all samples but the held-out ones, and judges it by those.
 Result<RungFit> TryRung(const LightResiduals& residuals, LightModel model, const Light& start,
                         const Split& split, const LightFitOptions& options, double& noise_rms) {
   Result<Fitted> fitted =
@@ -155,7 +158,7 @@ Result<RungFit> TryRung(const LightResiduals& residuals, LightModel model, const
                  .roughness_weight = fitted->roughness_weight};
 }
 
-// Climbs the rungs until one explains the held-out samples; returns which did best.
+// Climbs the rungs until one explains the held-out samples; returns the best one.
 Result<size_t> Climb(const LightResiduals& residuals, const Split& split, const Light& rough,
                      const LightFitOptions& options, LightFit& result) {
   Light start = rough;
@@ -170,7 +173,7 @@ Result<size_t> Climb(const LightResiduals& residuals, const Split& split, const 
       return tl::unexpected(rung.error());
     }
     if (!rung) {
-      break;  // what the lower rung has must do
+      break;  // the lower rung must do
     }
     start = rung->light;
     result.rungs.push_back(std::move(*rung));
@@ -184,7 +187,7 @@ Result<size_t> Climb(const LightResiduals& residuals, const Split& split, const 
   return chosen;
 }
 
-// The chosen rung fitted to all samples, with what is uncertain of it.
+// Fits the chosen rung to all samples, with its standard deviations.
 Status FitToAll(const LightResiduals& residuals, const RungFit& best, const Light& rough,
                 const std::vector<size_t>& all, const LightFitOptions& options, LightFit& result) {
   const LightModel model = best.light.model;
@@ -227,7 +230,7 @@ Result<LightFit> FitLight(const std::vector<SheetSample>& samples, const Light& 
   }
   if (rough.model == LightModel::kDistant) {
     return Fail(ErrorCode::kInvalidArgument,
-                "the rough light is distant; need its position_mm, to within some 50 mm");
+                "the rough light is distant; need its position_mm, within some 50 mm");
   }
   const Split split(samples.size());
   const LightResiduals residuals(samples, options.albedo);

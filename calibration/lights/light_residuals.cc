@@ -6,18 +6,17 @@
 #include <algorithm>
 #include <cmath>
 
-#include "calibration/fit/robust_spread.h"
 #include "core/linear_algebra.h"
+#include "core/statistics.h"
 
 namespace sateen {
 namespace {
 
-constexpr double kMadToSd = 1.4826;      // of a normal distribution
-constexpr double kReferenceMm = 1000.0;  // where flux is irradiance
+constexpr double kReferenceMm = 1000.0;  // distance at which flux is irradiance
 constexpr double kLargestAnisotropy = 50.0;
-constexpr double kLeastEigenvalue = 1e-12;  // of the scaled normal equations
+constexpr double kLeastEigenvalue = 1e-12;  // of the scaled normal matrix
 
-// A light as the solver moves it.
+// Unknowns of a light.
 struct LightUnknowns {
   Eigen::Vector3d position_mm;
   Eigen::Vector3d log_flux;
@@ -43,7 +42,7 @@ struct LightUnknowns {
   }
 };
 
-// The terms of (1) of one sample.
+// Residuals (1) of one sample.
 struct NearResidual {
   const SheetSample* sample;
   double albedo;
@@ -78,14 +77,14 @@ struct LedResidual {
     const T cosine =
         from_light.dot(Eigen::Map<const Eigen::Matrix<T, 3, 1>>(axis)) / from_light.norm();
     if (!(cosine > T(0.0))) {
-      return false;  // the light faces away: no step to take
+      return false;  // the light faces away: the step is refused
     }
     near.Evaluate(position, log_flux, T(pow(cosine, anisotropy[0])), residual);
     return true;
   }
 };
 
-// Of all unknowns in the order in which they were added: the inverse of J^T J at the solution.
+// Returns (J^T J)^-1 at the solution, unknowns in the order in which they were added.
 Result<Eigen::MatrixXd> CovarianceOf(ceres::Problem& problem) {
   ceres::CRSMatrix jacobian;
   problem.Evaluate(ceres::Problem::EvaluateOptions(), nullptr, nullptr, nullptr, &jacobian);
@@ -102,7 +101,7 @@ Result<Eigen::MatrixXd> CovarianceOf(ceres::Problem& problem) {
       }
     }
   }
-  // LightUnknowns have units of their own; only after each is scaled does the rank mean something.
+  // Unknowns have units of their own. The rank has a meaning only after each is scaled.
   const Eigen::VectorXd scale = normal.diagonal().cwiseSqrt().cwiseMax(1e-300);
   const Eigen::MatrixXd scaled =
       scale.cwiseInverse().asDiagonal() * normal * scale.cwiseInverse().asDiagonal();
@@ -165,7 +164,7 @@ double LightResiduals::NoiseRms(const Light& light, const std::vector<size_t>& i
   for (size_t i = 3; i < residuals.size(); ++i) {
     differences.push_back(std::abs(residuals[i] - residuals[i - 3]));
   }
-  return kMadToSd * Median(std::move(differences)) / std::sqrt(2.0);
+  return kSdPerMad * Median(std::move(differences)) / std::sqrt(2.0);
 }
 
 Result<LightDescent> LightResiduals::Descend(LightModel model, const Light& start,

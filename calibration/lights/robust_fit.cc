@@ -5,7 +5,7 @@
 namespace sateen {
 namespace {
 
-constexpr double kLossScale = 2.0;  // of the residuals' spread
+constexpr double kLossScale = 2.0;  // times the residuals' spread
 constexpr int kRobustRounds = 4;
 
 }  // namespace
@@ -26,10 +26,11 @@ Result<RobustFit> FitRobustly(const LightResiduals& residuals, LightModel model,
   const std::vector<double> off = residuals.Of(fit.light, indices);
   fit.used = OnModel(indices, off, SpreadOf(off));
   if (2 * fit.used.size() < indices.size()) {
-    return Fail(ErrorCode::kDegenerate,
-                "only {} of {} samples follow one light; need half: is it this light, and white "
-                "paper that fills the table?",
-                fit.used.size(), indices.size());
+    return Fail(
+        ErrorCode::kDegenerate,
+        "only {} of {} samples follow one light; need half: is this the light's frame, and does "
+        "white paper fill the table?",
+        fit.used.size(), indices.size());
   }
   Result<LightDescent> last = residuals.Descend(model, fit.light, fit.used, 0.0, with_covariance);
   if (!last) {

@@ -10,16 +10,17 @@
 
 namespace sateen {
 
+// Light fitted to the samples that follow it.
 struct RobustFit {
   Light light;
-  std::vector<size_t> used = {};  // of the indices: those that follow the light
+  std::vector<size_t> used = {};  // indices of the samples that follow the light
   int iterations = 0;
-  Eigen::MatrixXd covariance = {};  // as of LightDescent
+  Eigen::MatrixXd covariance = {};  // as in LightDescent
 };
 
-/// Fits one rung of the model ladder to samples of which some follow no light: rounds of Cauchy's
-/// loss as wide as the residuals then are, so that it closes in on those that follow the light; then
-/// squares without what lies further off than 4 robust standard deviations.
+/// Fits one rung of the model ladder to samples of which some follow no light. Rounds of Cauchy's
+/// loss, each twice as wide as the residuals then are, close in on the samples that follow the
+/// light. Then least squares are fitted to the samples within 4 robust standard deviations.
 ///
 /// Errors  kDegenerate: fewer than half of the samples follow one light; as Descend
 [[nodiscard]] Result<RobustFit> FitRobustly(const LightResiduals& residuals, LightModel model,

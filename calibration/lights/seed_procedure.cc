@@ -4,19 +4,21 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 
-#include "core/linear_algebra.h"
+#include "core/angle.h"
+#include "core/gauss_newton.h"
 
 namespace sateen {
 namespace {
 
-constexpr int kMostPositionSteps = 20;  // of Gauss and Newton's method in (2)
+constexpr int kMostPositionSteps = 20;  // in (2)
 constexpr double kLeastPositionStepMm = 1e-9;
 
 using Map = std::vector<Eigen::Vector3d>;
 
-// (1 2 1) / 4 along one direction, where both neighbours are known: what is linear stays as it is, at
-// the border too.
+// Smooths by (1 2 1) / 4 along one direction, where both neighbours are known. A linear map is not
+// changed, not even at the border.
 Map SmoothedAlong(const Map& map, int count, int stride, int lines, int line_stride) {
   Map smoothed = map;
   for (int line = 0; line < lines; ++line) {
@@ -40,7 +42,7 @@ class Procedure {
             int rows, const SeedProcedureOptions& options)
       : samples_(samples), blocks_(blocks), columns_(columns), rows_(rows), options_(options) {}
 
-  // Equation (1).
+  // Returns (1).
   [[nodiscard]] Map IntensityMap(const Eigen::Vector3d& s) const {
     Map map(static_cast<size_t>(columns_) * static_cast<size_t>(rows_), Eigen::Vector3d::Zero());
     for (size_t i = 0; i < samples_.size(); ++i) {
@@ -57,30 +59,22 @@ class Procedure {
     return map;
   }
 
-  // Equation (2), by Gauss and Newton's method.
-  [[nodiscard]] Eigen::Vector3d SolvePosition(const Map& intensity, Eigen::Vector3d s) const {
-    double log_phi =
+  // Solves (2) from position s. The result is not finite where there is no solution.
+  [[nodiscard]] Eigen::Vector3d SolvePosition(const Map& intensity,
+                                              const Eigen::Vector3d& s) const {
+    Eigen::Vector4d start;
+    start << s,
         options_.direction_step == DirectionStep::kFallOff ? MeanLogFlux(intensity, s) : 0.0;
-    for (int step = 0; step < kMostPositionSteps; ++step) {
-      Eigen::Matrix4d a = Eigen::Matrix4d::Zero();
-      Eigen::Vector4d b = Eigen::Vector4d::Zero();
-      for (size_t i = 0; i < samples_.size(); ++i) {
-        const double held = intensity[static_cast<size_t>(blocks_[i])].sum();
-        if (held > 0.0) {
-          AddEquation(samples_[i], held, s, log_phi, a, b);
-        }
-      }
-      if (options_.direction_step == DirectionStep::kEquation) {
-        a(3, 3) = 1.0;  // phi has no part in it
-      }
-      const Eigen::Vector4d change = SolveSymmetric(a, b);
-      s += change.head<3>();
-      log_phi += change[3];
-      if (!(change.head<3>().norm() > kLeastPositionStepMm)) {
-        break;
-      }
-    }
-    return s;
+    const auto fit = MinimizeSquares<4>(
+        start, [&](const Eigen::Vector4d& x) { return PositionEquations(intensity, x); },
+        [](const Eigen::Vector4d& x, const Eigen::Vector4d& step) {
+          return Eigen::Vector4d(x + step);
+        },
+        {.rule = StepRule::kFull, .max_iterations = kMostPositionSteps, .min_relative_fall = 0.0},
+        [](const Eigen::Vector4d& step) { return step.head<3>().norm() <= kLeastPositionStepMm; });
+    return fit.end == GaussNewtonEnd::kNotFinite
+               ? Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN())
+               : Eigen::Vector3d(fit.state.head<3>());
   }
 
   [[nodiscard]] double LargestTurn(const Eigen::Vector3d& from, const Eigen::Vector3d& to) const {
@@ -88,16 +82,31 @@ class Procedure {
     for (const SheetSample& sample : samples_) {
       const Eigen::Vector3d a = from - sample.point_mm;
       const Eigen::Vector3d b = to - sample.point_mm;
-      turn = std::max(turn, std::atan2(a.cross(b).norm(), a.dot(b)));
+      turn = std::max(turn, AngleBetweenRad(a, b));
     }
     return turn;
   }
 
  private:
-  // Adds one sample's residual r and its gradient g: a += g g^T, b -= g r.
-  void AddEquation(const SheetSample& sample, double held, const Eigen::Vector3d& s, double log_phi,
-                   Eigen::Matrix4d& a, Eigen::Vector4d& b) const {
-    const Eigen::Vector3d d = s - sample.point_mm;
+  // Returns the normal equations of (3a) or (3b) for position and log phi.
+  [[nodiscard]] NormalEquations<4> PositionEquations(const Map& intensity,
+                                                     const Eigen::Vector4d& x) const {
+    NormalEquations<4> equations;
+    for (size_t i = 0; i < samples_.size(); ++i) {
+      const double held = intensity[static_cast<size_t>(blocks_[i])].sum();
+      if (held > 0.0) {
+        AddSample(samples_[i], held, x, equations);
+      }
+    }
+    if (options_.direction_step == DirectionStep::kEquation) {
+      equations.information(3, 3) = 1.0;  // phi has no part in it
+    }
+    return equations;
+  }
+
+  void AddSample(const SheetSample& sample, double held, const Eigen::Vector4d& x,
+                 NormalEquations<4>& equations) const {
+    const Eigen::Vector3d d = x.head<3>() - sample.point_mm;
     const double distance = d.norm();
     Eigen::Vector4d gradient = Eigen::Vector4d::Zero();
     double residual = 0.0;
@@ -107,13 +116,12 @@ class Procedure {
       const double scale = options_.albedo * held / measured;
       const double cosine = sample.normal.dot(l);
       residual = 1.0 - scale * cosine;  // (3a)
-      gradient.head<3>() = -scale * (sample.normal - cosine * l) / distance;
+      gradient.head<3>() = scale * (sample.normal - cosine * l) / distance;
     } else {
-      residual = std::log(held) - log_phi + 2.0 * std::log(distance);  // (3b)
-      gradient << 2.0 * d / (distance * distance), -1.0;
+      residual = std::log(held) - x[3] + 2.0 * std::log(distance);  // (3b)
+      gradient << -2.0 * d / (distance * distance), 1.0;
     }
-    a += gradient * gradient.transpose();
-    b -= gradient * residual;
+    equations.Add(gradient, residual);
   }
 
   [[nodiscard]] double MeanLogFlux(const Map& intensity, const Eigen::Vector3d& s) const {

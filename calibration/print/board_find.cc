@@ -13,15 +13,15 @@ namespace {
 
 constexpr size_t kFewestCorners = 6;
 constexpr size_t kFewestBoardMarkers = 3;
-constexpr double kFewestBoardInPlace = 0.9;  // of the markers
-constexpr double kMarkerSlack = 0.35;        // of a square: how far a lens may bend the board
-constexpr size_t kMarkersOfAPatch = 4;       // from which a corner's place is predicted
-constexpr double kPatchSquares = 3.0;        // squares to the farthest of them
-constexpr double kReachOfGap = 0.9;      // between a corner and the markers, read and refined in
-constexpr double kQuadrantShare = 0.35;  // of the side that CrossingContrast() is given, at most
-constexpr double kCrossing = 0.25;       // of the board's contrast, below which it is no corner
+constexpr double kFewestBoardInPlace = 0.9;  // share of the markers
+constexpr double kMarkerSlack = 0.35;        // of a square: largest deviation by the lens
+constexpr size_t kMarkersOfAPatch = 4;       // nearest markers that predict a corner's place
+constexpr double kPatchSquares = 3.0;        // distance of the farthest of them, in squares
+constexpr double kReachOfGap = 0.9;          // share of the gap around a corner that is used
+constexpr double kQuadrantShare = 0.35;      // largest share of the square for CrossingContrast()
+constexpr double kCrossing = 0.25;           // least contrast of a corner over the board's
 
-// One marker of the board, seen.
+// Marker of the board in the picture.
 struct BoardMarker {
   Eigen::Vector3d center_mm;
   std::array<Eigen::Vector3d, 4> corners_mm;
@@ -78,8 +78,8 @@ std::vector<BoardMarker> InPlace(const std::vector<BoardMarker>& markers, double
   return kept;
 }
 
-// The board about a corner, from the nearest markers. Nothing where none is in a square that meets
-// there.
+// Returns the map of the board around a corner, from the nearest markers; nothing where no square
+// that meets there has a marker.
 std::optional<PlaneMap> PatchAt(const std::vector<BoardMarker>& markers,
                                 const Eigen::Vector3d& at_mm, double square_mm) {
   std::vector<std::pair<double, const BoardMarker*>> nearest;
@@ -111,8 +111,8 @@ std::optional<PlaneMap> PatchAt(const std::vector<BoardMarker>& markers,
   return FitPlaneMap(points_mm, corners_px);
 }
 
-// The corners beside the markers, refined, that look like corners: where they have a contrast, of
-// the sign that the colours of the squares say.
+// Returns the refined corners beside the markers that look like corners: their contrast is large
+// enough, and has the sign that the colours of the squares give it.
 BoardView CornersBeside(const Image<uint8_t>& grey, const BoardSpec& spec,
                         const std::vector<BoardMarker>& markers) {
   const Image<uint8_t> smooth = SmoothedForCorners(grey);

@@ -4,7 +4,7 @@
 
 namespace sateen {
 
-// FindBoard() of a chessboard.
+// Finds a chessboard, as FindBoard() does.
 [[nodiscard]] Result<BoardView> FindChessboard(const Image<uint8_t>& grey, const BoardSpec& spec);
 
 }  // namespace sateen

@@ -4,6 +4,9 @@
 #include <cmath>
 #include <numbers>
 #include <optional>
+#include <utility>
+
+#include "core/statistics.h"
 
 namespace sateen {
 namespace {
@@ -78,9 +81,7 @@ double EdgeWidthPx(const Image<uint8_t>& grey, const BoardSpec& spec, const Boar
   if (widths.empty()) {
     return 0.0;
   }
-  const auto middle = widths.begin() + static_cast<std::ptrdiff_t>(widths.size() / 2);
-  std::nth_element(widths.begin(), middle, widths.end());
-  return *middle;
+  return Median(std::move(widths));
 }
 
 }  // namespace sateen

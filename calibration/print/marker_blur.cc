@@ -8,16 +8,16 @@ namespace sateen {
 namespace {
 
 constexpr int kMostCells = 9;
-constexpr double kFarSigmas = 5.0;  // from an edge: black or white
+constexpr double kFarSigmas = 5.0;  // distance from an edge beyond which it has no effect
 
-// The blurred share of a marker's cells along one axis, and its derivatives.
+// Blurred shares of a marker's cells along one axis, and their derivatives.
 struct Shares {
   std::array<double, kMostCells> share = {};
   std::array<double, kMostCells> by_x = {};
   std::array<double, kMostCells> by_log_blur = {};
 };
 
-// `x` from the marker's low edge.
+// Returns the shares at distance `x` from the marker's low edge.
 Shares SharesAt(double x, int cells, double cell_mm, double blur_mm) {
   Shares shares;
   double phi = 0.0;

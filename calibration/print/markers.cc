@@ -16,7 +16,7 @@ constexpr int kWidestForMarkersPx = 2500;  // wider pictures are shrunk to find 
 
 constexpr double kSmoothingPx = 1.0;  // standard deviation
 
-// A view of our pixels; OpenCV has no constant one.
+// Wraps our pixels, which OpenCV must not change.
 cv::Mat MatOfGrey(const Image<uint8_t>& grey) {
   return {grey.height, grey.width, CV_8UC1, const_cast<uint8_t*>(grey.pixels.data())};
 }

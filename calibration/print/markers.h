@@ -14,20 +14,20 @@ namespace sateen {
 // A square marker of an ArUco dictionary as a picture shows it.
 struct MarkerView {
   int id = 0;
-  // Top left, top right, bottom right, bottom left of the marker as printed; to about a pixel.
+  // Top left, top right, bottom right and bottom left of the marker as printed, to about a pixel.
   std::array<Eigen::Vector2d, 4> corners_px = {};
 };
 
-// In order of their ids. A marker of which two are seen is left out: which is meant is unknown.
+// Finds markers, in order of their ids. An id that is seen twice is left out.
 [[nodiscard]] std::vector<MarkerView> FindMarkers(const Image<uint8_t>& grey,
                                                   const std::string& dictionary);
 
-// The picture smoothed for RefineCorner(): edges as sharp as a pixel pull corners towards the middle
-// of pixels, by up to 0.1 px; half of that goes.
+// Smooths the picture for RefineCorner(). Edges as sharp as a pixel pull corners towards the middle
+// of pixels by up to 0.1 px; smoothing halves that.
 [[nodiscard]] Image<uint8_t> SmoothedForCorners(const Image<uint8_t>& grey);
 
-// The crossing of edges next to `at_px`, to a few hundredths of a pixel, from the square of
-// 2 half_window_px + 1 pixels about it; `at_px` itself where the picture does not hold that square.
+// Returns the crossing of edges next to `at_px`, to a few hundredths of a pixel, from the square of
+// 2 half_window_px + 1 pixels about it. Returns `at_px` where that square is not in the picture.
 [[nodiscard]] Eigen::Vector2d RefineCorner(const Image<uint8_t>& smooth,
                                            const Eigen::Vector2d& at_px, int half_window_px);
 

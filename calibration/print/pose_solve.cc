@@ -1,11 +1,15 @@
 #include "calibration/print/pose_solve.h"
 
 #include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <optional>
+#include <utility>
 
 #include "calibration/print/plane_map.h"
 #include "core/angle.h"
+#include "core/gauss_newton.h"
 #include "core/linear_algebra.h"
 #include "rig/projection.h"
 
@@ -14,75 +18,55 @@ namespace {
 
 using Vector6d = Eigen::Matrix<double, 6, 1>;
 
-constexpr int kMostPoseSteps = 100;
-constexpr double kPoseStepTaken = 1e-12;  // relative fall of the cost that ends the steps
-constexpr double kRadStep = 1e-6;         // of numeric derivatives
+constexpr double kRadStep = 1e-6;  // of central differences
 constexpr double kMmStep = 1e-4;
 constexpr double kSamePose = 0.1 * kRadPerDeg;
 constexpr double kClearlyWorse = 9.0;  // variances: 3 standard deviations
 
-Eigen::VectorXd ResidualsPx(const Camera& camera, const Eigen::Isometry3d& pose,
-                            const std::vector<Eigen::Vector3d>& points_mm,
-                            const std::vector<Eigen::Vector2d>& corners_px) {
-  Eigen::VectorXd residuals(2 * static_cast<Eigen::Index>(points_mm.size()));
-  for (size_t i = 0; i < points_mm.size(); ++i) {
-    residuals.segment<2>(2 * static_cast<Eigen::Index>(i)) =
-        PixelOfTablePoint(camera, pose * points_mm[i]) - corners_px[i];
+// Returns the normal equations of the distances [px] between corners as seen and as `pose` has
+// them.
+NormalEquations<6> PoseEquations(const Camera& camera, const Eigen::Isometry3d& pose,
+                                 const std::vector<Eigen::Vector3d>& points_mm,
+                                 const std::vector<Eigen::Vector2d>& corners_px) {
+  std::array<std::pair<Eigen::Isometry3d, Eigen::Isometry3d>, 6> beside;
+  for (size_t k = 0; k < 6; ++k) {
+    const Vector6d step =
+        (k < 3 ? kRadStep : kMmStep) * Vector6d::Unit(static_cast<Eigen::Index>(k));
+    beside[k] = {Moved(pose, step), Moved(pose, -step)};
   }
-  return residuals;
+  NormalEquations<6> equations;
+  for (size_t i = 0; i < points_mm.size(); ++i) {
+    const Eigen::Vector2d residual = corners_px[i] - PixelOfTablePoint(camera, pose * points_mm[i]);
+    Eigen::Matrix<double, 6, 2> jacobian;
+    for (size_t k = 0; k < 6; ++k) {
+      jacobian.row(static_cast<Eigen::Index>(k)) =
+          (PixelOfTablePoint(camera, beside[k].first * points_mm[i]) -
+           PixelOfTablePoint(camera, beside[k].second * points_mm[i])) /
+          (2.0 * (k < 3 ? kRadStep : kMmStep));
+    }
+    equations.Add(jacobian.col(0), residual.x());
+    equations.Add(jacobian.col(1), residual.y());
+  }
+  return equations;
 }
 
 PlanePose RefinedPose(const Camera& camera, const Eigen::Isometry3d& start,
                       const std::vector<Eigen::Vector3d>& points_mm,
                       const std::vector<Eigen::Vector2d>& corners_px) {
-  PlanePose result;
-  result.camera_from_plane = start;
-  Eigen::VectorXd residuals = ResidualsPx(camera, start, points_mm, corners_px);
-  Eigen::Matrix<double, Eigen::Dynamic, 6> jacobian(residuals.size(), 6);
-  Matrix6d normal = Matrix6d::Zero();
-  double damping = 1e-6;
-  bool settled = false;
-  for (int step = 0; step < kMostPoseSteps && !settled; ++step) {
-    for (Eigen::Index k = 0; k < 6; ++k) {
-      const double h = k < 3 ? kRadStep : kMmStep;
-      const Vector6d move = h * Vector6d::Unit(k);
-      jacobian.col(k) =
-          (ResidualsPx(camera, Moved(result.camera_from_plane, move), points_mm, corners_px) -
-           ResidualsPx(camera, Moved(result.camera_from_plane, -move), points_mm, corners_px)) /
-          (2.0 * h);
-    }
-    normal = jacobian.transpose() * jacobian;
-    const Vector6d slope = jacobian.transpose() * residuals;
-    settled = true;
-    for (int attempt = 0; attempt < kMostPoseSteps; ++attempt) {
-      Matrix6d damped = normal;
-      damped.diagonal() *= 1.0 + damping;
-      const Eigen::Isometry3d next =
-          Moved(result.camera_from_plane, -SolveSymmetric(damped, slope));
-      const Eigen::VectorXd at_next = ResidualsPx(camera, next, points_mm, corners_px);
-      if (at_next.squaredNorm() < residuals.squaredNorm()) {
-        settled = residuals.squaredNorm() - at_next.squaredNorm() <
-                  kPoseStepTaken * residuals.squaredNorm();
-        result.camera_from_plane = next;
-        residuals = at_next;
-        damping = std::max(damping / 10.0, 1e-12);
-        break;
-      }
-      damping *= 10.0;
-      if (damping > 1e6) {
-        break;
-      }
-    }
-  }
-  const double cost = residuals.squaredNorm();
+  const auto fit = MinimizeSquares<6>(start,
+                                      [&](const Eigen::Isometry3d& pose) {
+                                        return PoseEquations(camera, pose, points_mm, corners_px);
+                                      },
+                                      Moved, {.rule = StepRule::kDamping, .max_iterations = 100});
   const auto count = static_cast<double>(points_mm.size());
-  result.rms_px = std::sqrt(cost / count);
-  result.covariance = cost / std::max(2.0 * count - 6.0, 1.0) * InverseOfSymmetric(normal);
-  return result;
+  const double variance = fit.equations.cost / std::max(2.0 * count - 6.0, 1.0);
+  return {.camera_from_plane = fit.state,
+          .covariance = variance * InverseOfSymmetric(fit.equations.information),
+          .rms_px = std::sqrt(fit.equations.cost / count)};
 }
 
-// The pose that the plane's map decomposes into, and the other one that looks much the same: with the
-// plane's normal mirrored in the line of sight. None where the plane shows its back.
+// Decomposes the plane's map into a pose, and adds the one that looks much the same: with the
+// normal mirrored in the line of sight. Returns none where the plane shows its back.
 std::vector<Eigen::Isometry3d> RoughPoses(const std::vector<Eigen::Vector3d>& points_mm,
                                           const std::vector<Eigen::Vector2d>& directions) {
   const std::optional<PlaneMap> found = FitPlaneMap(points_mm, directions);
@@ -95,7 +79,7 @@ std::vector<Eigen::Isometry3d> RoughPoses(const std::vector<Eigen::Vector3d>& po
   }
   PlaneMap map = *found * (2.0 / (found->col(0).norm() + found->col(1).norm()));
   if ((map * Eigen::Vector3d(center_mm.x(), center_mm.y(), 1.0)).z() < 0.0) {
-    map = -map;  // the plane lies before the camera
+    map = -map;  // the plane is in front of the camera
   }
   Eigen::Matrix3d axes;
   axes << map.leftCols<2>(), map.col(0).cross(map.col(1));
@@ -128,9 +112,10 @@ Eigen::Isometry3d Moved(const Eigen::Isometry3d& pose, const Vector6d& step) {
 Result<PlanePose> SolvePlanePose(const Camera& lens, const std::vector<Eigen::Vector3d>& points_mm,
                                  const std::vector<Eigen::Vector2d>& corners_px) {
   if (!FitPlaneMap(points_mm, corners_px)) {
-    return Fail(ErrorCode::kDegenerate,
-                "a pose from {} points; need 4 that do not lie in one line: show more of the board",
-                points_mm.size());
+    return Fail(
+        ErrorCode::kDegenerate,
+        "{} points, or all in one line; need 4 that do not lie in one line: show more of the board",
+        points_mm.size());
   }
   Camera camera = lens;
   camera.table_from_camera.setIdentity();
@@ -139,10 +124,11 @@ Result<PlanePose> SolvePlanePose(const Camera& lens, const std::vector<Eigen::Ve
   for (const Eigen::Vector2d& corner : corners_px) {
     const std::optional<Eigen::Vector3d> ray = RayOfPixel(camera, corner.x(), corner.y());
     if (!ray) {
-      return Fail(ErrorCode::kDegenerate,
-                  "a corner at ({:.1f}, {:.1f}) px, which the lens's distortion cannot show; the "
-                  "lens is not that of this picture",
-                  corner.x(), corner.y());
+      return Fail(
+          ErrorCode::kDegenerate,
+          "the lens's distortion cannot show the corner at ({:.1f}, {:.1f}) px; is this the "
+          "lens of the picture?",
+          corner.x(), corner.y());
     }
     directions.push_back(ray->hnormalized());
   }
@@ -152,9 +138,8 @@ Result<PlanePose> SolvePlanePose(const Camera& lens, const std::vector<Eigen::Ve
     poses.push_back(RefinedPose(camera, rough, points_mm, corners_px));
   }
   if (poses.empty()) {
-    return Fail(
-        ErrorCode::kDegenerate,
-        "no pose puts the board's printed side before the camera; is the picture mirrored?");
+    return Fail(ErrorCode::kDegenerate,
+                "no pose shows the board's printed side to the camera; is the picture mirrored?");
   }
   if (poses[1].rms_px < poses[0].rms_px) {
     std::swap(poses[0], poses[1]);

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "calibration/print/marker_blur.h"
+#include "core/gauss_newton.h"
 #include "core/linear_algebra.h"
 #include "rig/projection.h"
 
@@ -13,19 +14,15 @@ namespace sateen {
 namespace {
 
 constexpr int kPrintUnknowns = 7;  // w, d, log of the blur
-constexpr int kMostPrintSteps = 30;
 constexpr size_t kFewestPrintMarkers = 4;
 constexpr double kStartBlurPx = 0.7;
-constexpr double kStepTaken = 1e-9;  // relative fall of the cost that ends the steps
-constexpr double kMostDamping = 1e6;
 constexpr double kLeastContrast = 1e-6;  // of a marker's brightness
 
-using PrintUnknowns = Eigen::Matrix<double, kPrintUnknowns, 1>;
-using Normal = Eigen::Matrix<double, kPrintUnknowns, kPrintUnknowns>;
+using PrintUnknowns = Unknowns<kPrintUnknowns>;
 using Basis = Eigen::Matrix<double, 6, 1>;
 
-// Where a ray from the camera meets the plane, and how that moves with the pose: the plane's
-// material at x moves by v = w x (R x) + d, and the ray meets it elsewhere by
+// Point where a ray from the camera meets the plane, and its derivatives by the pose: the plane's
+// material at x moves by v = w x (R x) + d, and the ray then meets it elsewhere by
 // R^T (r (n . v) / (n . r) - v).
 struct PlanePoint {
   Eigen::Vector2d at_mm;
@@ -60,14 +57,12 @@ struct PatchPixel {
 struct Patch {
   const PrintedMarker* marker;
   std::vector<PatchPixel> pixels;
-  Eigen::Vector2d mm_per_px;  // of the plane along its axes
+  Eigen::Vector2d mm_per_px;  // along the axes of the plane
 };
 
 struct PatchSums {
-  double cost = 0.0;
-  double contrast = 0.0;  // of white and black
-  Normal normal = Normal::Zero();
-  PrintUnknowns slope = PrintUnknowns::Zero();
+  NormalEquations<kPrintUnknowns> equations;
+  double contrast = 0.0;  // between white and black
 };
 
 Basis BasisOf(const PatchPixel& pixel, double white) {
@@ -76,12 +71,12 @@ Basis BasisOf(const PatchPixel& pixel, double white) {
   return basis;
 }
 
-// The terms of (1) of one marker, its a and b solved for.
+// Returns the terms of (1) of one marker, its a and b eliminated.
 PatchSums SumsOf(const Patch& patch, const Eigen::Isometry3d& pose, double blur_px) {
   const Eigen::Vector2d blur_mm = blur_px * patch.mm_per_px;
   struct Row {
     Basis basis;
-    PrintUnknowns white_by;  // derivative of W by the unknowns
+    PrintUnknowns white_by;  // derivatives of W
   };
   std::vector<Row> rows;
   rows.reserve(patch.pixels.size());
@@ -103,16 +98,14 @@ PatchSums SumsOf(const Patch& patch, const Eigen::Isometry3d& pose, double blur_
     const PatchPixel& pixel = patch.pixels[i];
     const double residual = pixel.value - c.dot(rows[i].basis);
     const PrintUnknowns by = (c[3] + c.tail<2>().dot(pixel.place)) * rows[i].white_by;
-    sums.cost += residual * residual;
-    sums.slope += by * residual;  // the residual is orthogonal to the basis
-    sums.normal += by * by.transpose();
+    sums.equations.Add(by, residual);  // which is orthogonal to the basis
     cross += rows[i].basis * by.transpose();
   }
-  sums.normal -= cross.transpose() * SolveSymmetric(gram, cross);
+  sums.equations.information -= cross.transpose() * SolveSymmetric(gram, cross);
   return sums;
 }
 
-// The pixels within the marker and its quiet rim. Nothing where the picture does not hold them all.
+// Returns the pixels of the marker and its quiet rim; nothing where some are not in the picture.
 std::optional<Patch> PatchOf(const Image<float>& picture, const Camera& camera,
                              const PrintedMarker& marker, const Eigen::Isometry3d& pose) {
   const double reach = 0.5 * marker.side_mm + marker.quiet_mm;
@@ -165,27 +158,20 @@ Camera AtOrigin(const Camera& lens) {
 }
 
 double MisfitOf(const Patch& patch, const PatchSums& sums) {
-  return std::sqrt(sums.cost / static_cast<double>(patch.pixels.size())) /
+  return std::sqrt(sums.equations.cost / static_cast<double>(patch.pixels.size())) /
          std::max(sums.contrast, kLeastContrast);
 }
 
 // Pose and blur, and (1) there.
-struct State {
+struct PrintState {
   Eigen::Isometry3d pose;
   double log_blur;
   std::vector<PatchSums> sums;
-
-  [[nodiscard]] double Cost() const {
-    double cost = 0.0;
-    for (const PatchSums& one : sums) {
-      cost += one.cost;
-    }
-    return cost;
-  }
 };
 
-State StateAt(const std::vector<Patch>& patches, const Eigen::Isometry3d& pose, double log_blur) {
-  State state{pose, log_blur, {}};
+PrintState StateAt(const std::vector<Patch>& patches, const Eigen::Isometry3d& pose,
+                   double log_blur) {
+  PrintState state{pose, log_blur, {}};
   state.sums.reserve(patches.size());
   for (const Patch& patch : patches) {
     state.sums.push_back(SumsOf(patch, pose, std::exp(log_blur)));
@@ -193,39 +179,28 @@ State StateAt(const std::vector<Patch>& patches, const Eigen::Isometry3d& pose, 
   return state;
 }
 
-Normal NormalOf(const State& state) {
-  Normal normal = Normal::Zero();
+NormalEquations<kPrintUnknowns> EquationsOf(const PrintState& state) {
+  NormalEquations<kPrintUnknowns> all;
   for (const PatchSums& one : state.sums) {
-    normal += one.normal;
+    all.information += one.equations.information;
+    all.gradient += one.equations.gradient;
+    all.cost += one.equations.cost;
   }
-  return normal;
+  return all;
 }
 
-State Descend(const std::vector<Patch>& patches, State state) {
-  double damping = 1e-6;
-  for (int step = 0; step < kMostPrintSteps && damping <= kMostDamping; ++step) {
-    Normal normal = NormalOf(state);
-    PrintUnknowns slope = PrintUnknowns::Zero();
-    for (const PatchSums& one : state.sums) {
-      slope += one.slope;
-    }
-    normal.diagonal() *= 1.0 + damping;
-    const PrintUnknowns move = SolveSymmetric(normal, slope);
-    State next = StateAt(patches, Moved(state.pose, move.head<6>()),
-                         state.log_blur + std::clamp(move[6], -0.5, 0.5));
-    const double fall = state.Cost() - next.Cost();
-    if (fall > 0.0) {
-      const bool settled = fall < kStepTaken * state.Cost();
-      state = std::move(next);
-      damping = std::max(damping / 10.0, 1e-9);
-      if (settled) {
-        break;
-      }
-    } else {
-      damping *= 10.0;
-    }
-  }
-  return state;
+GaussNewtonFit<kPrintUnknowns, PrintState> Descend(const std::vector<Patch>& patches,
+                                                   const Eigen::Isometry3d& start) {
+  return MinimizeSquares<kPrintUnknowns>(
+      StateAt(patches, start, std::log(kStartBlurPx)), EquationsOf,
+      [&](const PrintState& at, const PrintUnknowns& step) {
+        return StateAt(patches, Moved(at.pose, step.head<6>()),
+                       at.log_blur + std::clamp(step[6], -0.5, 0.5));
+      },
+      {.rule = StepRule::kDamping,
+       .max_iterations = 30,
+       .min_relative_fall = 1e-9,
+       .min_damping = 1e-9});
 }
 
 }  // namespace
@@ -247,15 +222,17 @@ Result<PrintFit> FitPrint(const Image<float>& picture, const Camera& lens,
     return Fail(ErrorCode::kDegenerate, "{} markers lie wholly in the picture; need {}",
                 patches.size(), kFewestPrintMarkers);
   }
-  const State state = Descend(patches, StateAt(patches, start, std::log(kStartBlurPx)));
+  const auto descent = Descend(patches, start);
+  const PrintState& state = descent.state;
   PrintFit fit{.camera_from_plane = state.pose, .blur_px = std::exp(state.log_blur)};
   fit.misfit.assign(markers.size(), -1.0);
-  Normal scores = Normal::Zero();
+  UnknownsMatrix<kPrintUnknowns> scores = UnknownsMatrix<kPrintUnknowns>::Zero();
   for (size_t i = 0; i < patches.size(); ++i) {
     fit.misfit[marker_of_patch[i]] = MisfitOf(patches[i], state.sums[i]);
-    scores += state.sums[i].slope * state.sums[i].slope.transpose();
+    const PrintUnknowns& score = state.sums[i].equations.gradient;
+    scores += score * score.transpose();
   }
-  const Normal inverse = InverseOfSymmetric(NormalOf(state));
+  const UnknownsMatrix<kPrintUnknowns> inverse = InverseOfSymmetric(descent.equations.information);
   const auto count = static_cast<double>(patches.size());
   const double unbiased = count / std::max(count - 0.5 * kPrintUnknowns, 1.0);
   fit.covariance = unbiased * (inverse * scores * inverse).topLeftCorner<6, 6>();

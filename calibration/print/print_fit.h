@@ -11,49 +11,50 @@
 
 namespace sateen {
 
-// A marker as it is printed, upright in the plane z = 0.
+// Printed marker, upright in the plane z = 0.
 struct PrintedMarker {
   Eigen::Vector2d center_mm = Eigen::Vector2d::Zero();
   double side_mm = 0.0;
-  double quiet_mm = 0.0;  // white about it that the fit looks at too
-  Image<uint8_t> cells;   // 0 black, with the black frame, as MarkerCells() gives them
+  double quiet_mm = 0.0;  // width of the white around it that the fit also uses
+  Image<uint8_t> cells;   // 0: black; with the black frame, as MarkerCells() returns them
 };
 
+// Pose and blur of a print.
 struct PrintFit {
   Eigen::Isometry3d camera_from_plane = Eigen::Isometry3d::Identity();
-  // Of w (rad) and d (mm) in x_in_camera = exp(w) R x + t + d.
+  // Covariance of w [rad] and d [mm] in x_in_camera = exp(w) R x + t + d.
   Matrix6d covariance = Matrix6d::Zero();
-  double blur_px = 0.0;  // standard deviation of the point spread, the pixel's own included
-  // Of each marker: root mean square of what the fit leaves, over its contrast of white and black.
+  double blur_px = 0.0;  // standard deviation of the point spread, with that of the pixel itself
+  // Root mean square residual of each marker over its contrast between white and black.
   std::vector<double> misfit;
 };
 
-/// The pose of a plane of printed markers and the blur under which the print, rendered, agrees best
-/// with the picture, all pixels about the markers at once:
+/// Fits the pose of a plane of printed markers and the blur, so that the rendered print agrees best
+/// with the picture in all pixels around the markers:
 ///
 ///     argmin  sum_m sum_(u in m) (I(u) - a_m(u) - b_m(u) W_m(x(u)))^2                      (1)
 ///     W_m(x) = 1 - sum over black cells of P(x; x0, x1) P(y; y0, y1)                        (2)
 ///     P(x; x0, x1) = Phi((x - x0) / s) - Phi((x - x1) / s)                                  (3)
 ///
-/// x(u) is where the ray of pixel u meets the plane, a_m and b_m are linear in u, for light that
-/// varies, and eliminated, and s is the blur, laid onto the plane. Gauss and Newton's method on
-/// pose and blur, with the projected Jacobian of Kaufman. Edges everywhere around a marker count,
-/// not its corners alone, and a blur that is symmetric shifts none of them.
+/// x(u) is where the ray of pixel u meets the plane. a_m and b_m are linear in u, for light that
+/// varies, and are eliminated. s is the blur, laid onto the plane. Levenberg and Marquardt's method
+/// on pose and blur, with the projected Jacobian of Kaufman. All edges of a marker count, not its
+/// corners alone, and a symmetric blur shifts none of them.
 ///
-/// The covariance takes the residuals of one marker as correlated, those of two as not
+/// The covariance takes residuals as correlated within a marker and independent between markers
 /// (the cluster-robust estimator of Liang and Zeger, Biometrika 73, 1986).
 ///
 /// picture  grey, linear; any unit
-/// lens     its table_from_camera counts for nothing
+/// lens     its table_from_camera is ignored
 /// start    camera_from_plane, to within about a quarter of a cell
 /// Errors   kDegenerate: fewer than 4 markers lie wholly in the picture
-/// Cost     about 1 us a pixel of the markers
+/// Cost     about 1 us per pixel of the markers
 [[nodiscard]] Result<PrintFit> FitPrint(const Image<float>& picture, const Camera& lens,
                                         const std::vector<PrintedMarker>& markers,
                                         const Eigen::Isometry3d& start);
 
-// The misfit of each marker, as above, in another picture at a pose and blur that are known;
-// negative where the marker does not lie wholly in the picture.
+// Returns the misfit of each marker in another picture, at a known pose and blur; negative where
+// the marker is not wholly in the picture.
 [[nodiscard]] std::vector<double> PrintMisfit(const Image<float>& picture, const Camera& lens,
                                               const std::vector<PrintedMarker>& markers,
                                               const PrintFit& at);

@@ -10,12 +10,12 @@
 namespace sateen {
 namespace {
 
-constexpr double kDarkShare = 0.01;      // of the range: the brightest patch of a light is above
-constexpr double kSaturatedShare = 0.9;  // of the range: the darkest patch of a light is below
-constexpr double kNotable = 0.004;       // brightness against exposure time that is warned of
-constexpr double kSameTime = 0.02;       // of exposure times that a wrong frame may be of
+constexpr double kDarkShare = 0.01;      // of the range: least level of a light's brightest patch
+constexpr double kSaturatedShare = 0.9;  // of the range: most of a light's darkest patch
+constexpr double kNotable = 0.004;       // deviation from exposure time that is warned of
+constexpr double kSameTime = 0.02;       // relative difference of equal exposure times
 
-// What no site reads that is not saturated: the highest reading of all, or the file's white.
+// Returns a level that no unsaturated site reaches: the highest reading, or the file's white.
 double HighestDn(const ChartReadings& readings, const std::vector<PatchSample>& samples) {
   double highest = 0.0;
   for (const PatchSample& sample : samples) {
@@ -24,7 +24,7 @@ double HighestDn(const ChartReadings& readings, const std::vector<PatchSample>& 
   return std::min(highest, readings.file_white_dn);
 }
 
-// Of each light, the frame whose brightest patch is brightest without a saturated site.
+// Returns, per light, the frame whose brightest patch is brightest without a saturated site.
 std::map<size_t, size_t> BestFrames(const ChartReadings& readings,
                                     const std::vector<PatchSample>& samples) {
   const double highest_dn = HighestDn(readings, samples);
@@ -51,7 +51,7 @@ std::map<size_t, size_t> BestFrames(const ChartReadings& readings,
   return frames;
 }
 
-// The exposure time whose frames of that light are as bright as this one.
+// Returns the exposure time whose frames of that light are as bright as this one.
 std::optional<double> LikelyExposure(const ChartReadings& readings, const FrameBrightness& wrong) {
   const ChartFrame& frame = readings.frames[wrong.frame];
   const double likely_s = wrong.ratio * frame.exposure_s;

@@ -6,6 +6,7 @@
 #include <numbers>
 #include <vector>
 
+#include "core/statistics.h"
 #include "rig/projection.h"
 
 namespace sateen {
@@ -59,18 +60,17 @@ class ChartSearch {
       differences_[j] =
           LogBrightness({on_table.x(), on_table.y(), 0.0}) - places_[j].log_reflectance;
     }
-    sorted_ = differences_;
-    const auto middle = sorted_.begin() + static_cast<std::ptrdiff_t>(sorted_.size() / 2);
-    std::nth_element(sorted_.begin(), middle, sorted_.end());
+    const double median = Median(differences_);
     double sum = 0.0;
     for (const double difference : differences_) {
-      sum += std::min(1.0, std::abs(difference - *middle));
+      sum += std::min(1.0, std::abs(difference - median));
     }
     return sum / static_cast<double>(differences_.size());
   }
 
  private:
-  // Of the picture over that of the light; far off where there is no picture or nothing in it.
+  // Returns the logarithm of the picture's brightness over that of the light; -100 outside the
+  // picture and where either is 0.
   [[nodiscard]] double LogBrightness(const Eigen::Vector3d& point_mm) const {
     constexpr double kNothing = -100.0;
     const Eigen::Vector2d pixel = PixelOfTablePoint(camera_, point_mm);
@@ -85,7 +85,7 @@ class ChartSearch {
     return brightness > 0.0 && expected > 0.0 ? std::log(brightness / expected) : kNothing;
   }
 
-  // Bilinear, so that (1) falls smoothly towards its least value.
+  // Interpolates bilinearly, so that (1) falls smoothly towards its minimum.
   [[nodiscard]] double BetweenCells(double x, double y) const {
     const int left = static_cast<int>(x);
     const int top = static_cast<int>(y);
@@ -101,10 +101,9 @@ class ChartSearch {
   const Light& light_;
   std::vector<Place> places_;
   std::vector<double> differences_;
-  std::vector<double> sorted_;
 };
 
-// Halves the steps around the best place until they are fine.
+// Searches around the best place with steps that are halved until they are fine.
 Candidate Refine(ChartSearch& search, Candidate best, double& misfit) {
   double shift_mm = 0.5 * kShiftStepMm;
   double turn_rad = 0.5 * kTurnStepRad;
@@ -166,12 +165,13 @@ Result<ChartPose> FindChart(const Image<float>& cells, const Camera& camera, con
     best = Refine(search, best, misfit);
   }
   if (misfit > kMostMisfit) {
-    return Fail(
-        ErrorCode::kBadData,
-        "the chart was not found: at the best place, ({:.0f}, {:.0f}) mm, brightness is off "
-        "its patches' by {:.0f} %; need the chart's middle within {:g} mm of the table's, "
-        "the whole chart in the picture, and its own file of patches",
-        best.x(), best.y(), 100.0 * (std::exp(misfit) - 1.0), options.max_shift_mm);
+    return Fail(ErrorCode::kBadData,
+                "the chart was not found: at the best place, ({:.0f}, {:.0f}) mm, its patches' "
+                "brightness is "
+                "off by {:.0f} %; need the chart's middle within {:g} mm of the table's, the whole "
+                "chart in "
+                "the picture, and its own file of patches",
+                best.x(), best.y(), 100.0 * (std::exp(misfit) - 1.0), options.max_shift_mm);
   }
   return ChartPose{PoseOf(best), misfit};
 }

@@ -11,29 +11,29 @@
 namespace sateen {
 
 struct FindChartOptions {
-  double max_shift_mm = 12.0;  // of the chart's middle from the table's, along x and y; (0, 1000]
-  double max_turn_rad = 0.07;  // from any of the four ways to lay it down; [0, pi / 4]
+  double max_shift_mm = 12.0;  // largest shift of the chart from the table's origin; (0, 1000]
+  double max_turn_rad = 0.07;  // largest turn from a multiple of 90 degrees; [0, pi / 4]
 };
 
-// Where the chart lies on the table, and how well that explains the picture.
+// Pose of the chart on the table, and how well it explains the picture.
 struct ChartPose {
   Eigen::Isometry2d table_from_chart = Eigen::Isometry2d::Identity();
-  double misfit = 0.0;  // mean |log| of brightness over what is expected; large differences count 1
+  double misfit = 0.0;  // (1) of FindChart()
 };
 
-/// Finds a chart that lies near the middle of the table, any of four ways round, by
+/// Finds a chart that lies near the middle of the table, turned by any multiple of 90 degrees, by
 ///
-///     argmin over shift and turn   mean_j min(1, |log b(x_j) - log rho_j e(x_j) n.l(x_j) - m|)   (1)
+///     argmin over shift and turn  mean_j min(1, |log b(x_j) - log rho_j e(x_j) n.l(x_j) - m|)  (1)
 ///
-/// where x_j are places within all patches, b is the picture's brightness there, rho the patch's
-/// reflectance, e and l of the light's model and m the median of the differences. Edges between
-/// patches give the place, reflectances the way round. A grid of 3 mm and 2 degrees is refined to
-/// 0.1 mm.
+/// where x_j are places in all patches, b is the picture's brightness there, rho the patch's
+/// reflectance, e and l those of the light's model, and m the median of the differences. Edges
+/// between patches tell the shift, reflectances the turn. A grid of 3 mm and 2 degrees is refined
+/// to 0.1 mm.
 ///
 /// cells    brightness, linear, black subtracted; cell (i, j) is the mean of sites 2i, 2i + 1
 ///          across and 2j, 2j + 1 down
 /// Errors   kInvalidArgument: an option out of range
-///          kBadData: no place explains the picture to within a third; the chart is not there
+///          kBadData: (1) is above a third everywhere: the chart is not there
 /// Cost     some 0.2 s for six patches
 [[nodiscard]] Result<ChartPose> FindChart(const Image<float>& cells, const Camera& camera,
                                           const Light& light, const Chart& chart,

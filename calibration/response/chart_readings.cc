@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "core/linear_algebra.h"
+#include "core/statistics.h"
 
 namespace sateen {
 namespace {
@@ -37,7 +38,7 @@ std::array<SiteMoments, 3> MomentsOf(const PatchSites& sites, const std::vector<
   return moments;
 }
 
-// Dark readings of one patch and colour over exposure time: a + b t.
+// Dark level of one patch and colour over exposure time: a + b t.
 struct DarkLine {
   double a = 0.0;
   double b = 0.0;
@@ -167,10 +168,8 @@ double UnevennessOf(const PatchSites& sites, const std::vector<uint16_t>& dn, do
       largest = std::max(largest, misfits.back());
     }
   }
-  // The median of |deviations| is 0.674 standard deviations; a speck of dust does not change it.
-  const auto middle = misfits.begin() + static_cast<std::ptrdiff_t>(misfits.size() / 2);
-  std::nth_element(misfits.begin(), middle, misfits.end());
-  const double sd = *middle / 0.674;
+  // The median of |deviations| is 0.674 standard deviations. A speck of dust does not change it.
+  const double sd = Median(std::move(misfits)) / 0.674;
   return std::max(0.0, (largest - 5.0 * sd) / std::max(mean / filled, 1e-9));
 }
 

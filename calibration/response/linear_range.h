@@ -5,30 +5,30 @@
 
 namespace sateen {
 
-// Points of about one level. [DN above the dark]
+// Points of about one level.
 struct LinearityBin {
-  double level_dn = 0.0;
+  double level_dn = 0.0;   // above the dark
   double deviation = 0.0;  // measured / expected - 1
-  double sd = 0.0;         // of that
+  double sd = 0.0;         // standard deviation of that
 };
 
-// Levels over which readings are proportional to exposure. [DN above the dark]
+// Levels above the dark between which readings are proportional to exposure.
 struct LinearRange {
   double from_dn = 0.0;
-  double to_dn = 0.0;    // as high as bins tell, or
-  bool departs = false;  // where the tolerance is left
+  double to_dn = 0.0;
+  bool departs = false;  // true: the tolerance is left at to_dn; false: bins tell no further
 };
 
-/// The range from the first bin above `start_dn` that is within the tolerance outwards. With deviation
-/// delta and standard deviation sd, a bin
+/// Finds the range around the first bin above `start_dn` that is within the tolerance. A bin with
+/// deviation delta and standard deviation sd
 ///
-///     tells where          sd <= tolerance / 2                                             (1)
-///     leaves it where      |delta| > tolerance + 2 sd                                       (2)
+///     is certain where     sd <= tolerance / 2                                              (1)
+///     is outside where     |delta| > tolerance + 2 sd                                       (2)
 ///
-/// Either way the range goes to the last bin that tells that it is within the tolerance before the
-/// first that leaves it: a noisy bin between others ends no range. Upwards, where bins beyond that one
-/// leave it or tell that they are off, it departs: it goes on to where a straight line to the first of
-/// them is as far off as the tolerance.
+/// In both directions the range ends at the last bin that is certain and within the tolerance,
+/// before the first that is outside. A noisy bin between others does not end it. If a bin above
+/// that end is outside, or certain and beyond the tolerance, the range departs: it ends where a
+/// straight line to the first such bin reaches the tolerance.
 ///
 /// bins     from dark to bright
 /// Returns  nothing where no bin above `start_dn` is within the tolerance

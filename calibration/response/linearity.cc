@@ -6,7 +6,7 @@
 #include <map>
 #include <set>
 
-#include "calibration/fit/robust_spread.h"
+#include "core/statistics.h"
 
 namespace sateen {
 namespace {
@@ -54,7 +54,7 @@ class LinearityFit {
     return slope_[SeriesOf(sample)] * sample.exposure_s;
   }
 
-  // (1)
+  // Fits (1).
   void FitSlopes() {
     const size_t count = readings_.lights.size() * readings_.patches.size() * 3;
     std::vector<double> products(count, 0.0);
@@ -72,7 +72,8 @@ class LinearityFit {
     }
   }
 
-  // Against the median over the other frames, so that one wrong frame does not hide in its own fit.
+  // Compares each frame with the median over all, so that a wrong frame does not hide in its own
+  // fit.
   void CompareFrames() {
     std::map<size_t, std::vector<double>> rates;  // of each series
     for (const PatchSample& sample : samples_) {
@@ -122,12 +123,12 @@ class LinearityFit {
       for (double& site : sites[c]) {
         site = std::abs(site - level);
       }
-      result_.rgb[c].saturation_dn = level - 3.0 * 1.4826 * Median(std::move(sites[c]));
+      result_.rgb[c].saturation_dn = level - 3.0 * kSdPerMad * Median(std::move(sites[c]));
       clipped_from_dn_ = std::min(clipped_from_dn_, *result_.rgb[c].saturation_dn);
     }
   }
 
-  // (2). What a frame is off by in all its patches is no better known than that.
+  // Fills in (2). The median deviation of a frame counts as its standard deviation, too.
   void Compare() {
     std::map<size_t, double> off;  // of frames
     for (const FrameBrightness& frame : result_.frames) {

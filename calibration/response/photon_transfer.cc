@@ -19,7 +19,7 @@ struct Line {
   Eigen::Matrix2d covariance = Eigen::Matrix2d::Zero();
 };
 
-// (1), by least squares that are weighted anew from the line itself.
+// Fits (1) by least squares, weighted anew from the line in each round.
 Line FitLine(const std::vector<const TransferPoint*>& points) {
   Line line;
   std::vector<double> expected;
@@ -57,7 +57,7 @@ double MisfitOf(const std::vector<const TransferPoint*>& points, const Line& lin
   return std::sqrt(sum / static_cast<double>(points.size()));
 }
 
-// The points of one patch in a pair of frames, each colour that has no site from `highest_dn` on.
+// Adds the points of one patch in a pair of frames, one per colour that is usable.
 void AddPair(const PatchSites& sites, const std::vector<uint16_t>& a,
              const std::vector<uint16_t>& b, const std::array<double, 3>& mean_dn,
              const std::array<bool, 3>& is_usable, bool is_dark,
@@ -84,7 +84,7 @@ void AddPair(const PatchSites& sites, const std::vector<uint16_t>& a,
   }
 }
 
-// Frames of one light, or dark ones, of one exposure, two by two in their order.
+// Pairs frames of one light and exposure, or dark frames of one exposure, in their order.
 std::vector<std::pair<size_t, size_t>> PairsOf(const std::vector<ChartFrame>& frames) {
   std::map<std::pair<std::optional<size_t>, double>, std::optional<size_t>> waiting;
   std::vector<std::pair<size_t, size_t>> pairs;

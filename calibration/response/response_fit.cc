@@ -9,8 +9,8 @@
 namespace sateen {
 namespace {
 
-constexpr double kWellTested = 0.9;   // of saturation: linearity is known up to here or warned of
-constexpr double kFineNoiseDn = 0.4;  // read noise that rounding hides
+constexpr double kWellTested = 0.9;   // share of the range in which linearity should be tested
+constexpr double kFineNoiseDn = 0.4;  // read noise below which rounding hides it
 constexpr double kGainsDiffer = 0.01;
 
 class ResponseFitter {
@@ -74,7 +74,7 @@ class ResponseFitter {
     });
   }
 
-  // Saturation, or where a colour stops being linear.
+  // Sets white to saturation, or to where a colour stops being linear.
   Status SetWhite() {
     double departs_dn = std::numeric_limits<double>::infinity();
     double tested_dn = std::numeric_limits<double>::infinity();
@@ -101,23 +101,23 @@ class ResponseFitter {
     const double saturation_dn = result_.saturation_dn.value_or(readings_.file_white_dn);
     result_.white_dn = std::min(saturation_dn, departs_dn);
     if (!result_.saturation_dn) {
-      result_.warnings.push_back(fmt::format(
-          "no patch is saturated in any frame, so the files' own white of {:g} DN is taken for it; "
-          "add an exposure that saturates the white patch",
-          readings_.file_white_dn));
+      result_.warnings.push_back(
+          fmt::format("no patch is saturated in any frame, so white is the {:g} DN that the files "
+                      "state; add an "
+                      "exposure that saturates the white patch",
+                      readings_.file_white_dn));
     }
     const double needed_dn = dark_.black_dn + kWellTested * (result_.white_dn - dark_.black_dn);
     if (std::isfinite(tested_dn) && tested_dn < needed_dn) {
       result_.warnings.push_back(fmt::format(
-          "linearity was looked at up to {:.0f} DN, of {:.0f}; add exposures that put a patch "
-          "between",
+          "linearity is tested up to {:.0f} of {:.0f} DN; add exposures that put a patch between",
           tested_dn, result_.white_dn));
     }
     return {};
   }
 
-  // Half of the range: where a sensor bends by 1 %, its slope, which noise and colours follow, has
-  // changed by several.
+  // Returns half of the range. Where a sensor bends by 1 %, its slope has changed by several per
+  // cent, and noise and colours follow the slope.
   [[nodiscard]] double WellLinearDn() const {
     return dark_.black_dn + 0.5 * (result_.white_dn - dark_.black_dn);
   }
@@ -166,9 +166,8 @@ class ResponseFitter {
   void Warn() {
     if (dark_.is_cut) {
       result_.warnings.push_back(
-          "dark frames read 0 at many sites: this camera cuts off what lies below black, so the "
-          "black "
-          "level is too high by part of the read noise, which comes from the lit pairs alone");
+          "dark frames read 0 at many sites: this camera cuts off values below black, so the black "
+          "level is too high by part of the read noise; the read noise is from lit pairs alone");
     }
     if (!result_.transfer) {
       return;
@@ -176,8 +175,7 @@ class ResponseFitter {
     const PhotonTransfer& transfer = *result_.transfer;
     if (transfer.read_noise_dn < kFineNoiseDn) {
       result_.warnings.push_back(fmt::format(
-          "read noise is {:.2g} DN, which rounding to whole readings hides: its figure is "
-          "no better than a rough one",
+          "read noise is {:.2g} DN, which rounding to whole DN hides: the figure is rough",
           transfer.read_noise_dn));
     }
     for (size_t c = 0; c < 3; ++c) {

@@ -11,13 +11,13 @@ namespace {
 
 constexpr Eigen::Index kGreenIndex = 1;
 
-// One patch under one light, over all its frames: for red and blue.
+// Sums of one patch under one light over all its frames, for red and blue.
 struct PatchBalance {
   Eigen::Vector3d weight = Eigen::Vector3d::Zero();
-  Eigen::Vector3d sum = Eigen::Vector3d::Zero();  // of weighted logarithms
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();  // sum of weighted logarithms
 };
 
-using PatchBalances = std::map<size_t, PatchBalance>;  // of the patches of one light
+using PatchBalances = std::map<size_t, PatchBalance>;  // [patch], of one light
 
 void Add(const std::array<const PatchSample*, 3>& triple, const Eigen::Vector3d& rho,
          PatchBalance& balance) {
@@ -44,7 +44,7 @@ LightBalance MeanOf(const PatchBalances& patches) {
       sum += one.sum[c];
     }
     const double mean = sum / weights;
-    double scatter = 0.0;  // of the patches about the mean
+    double scatter = 0.0;  // scatter of the patches about the mean
     for (const auto& [patch, one] : patches) {
       const double off = one.sum[c] / one.weight[c] - mean;
       scatter += one.weight[c] * off * off;

@@ -5,15 +5,16 @@
 #include <cmath>
 #include <optional>
 
-#include "calibration/fit/robust_spread.h"
+#include "core/angle.h"
 #include "core/linear_algebra.h"
+#include "core/statistics.h"
 #include "imaging/color.h"
 
 namespace sateen {
 namespace {
 
 constexpr size_t kFewestLightsSeen = 3;
-constexpr double kLeastFilled = 0.25;  // of a tile, against the fullest one
+constexpr double kLeastFilled = 0.25;  // of the number of blocks in the fullest tile
 
 double LuminanceOf(const Eigen::Vector3d& rgb) {
   return rgb.dot(Eigen::Vector3d(static_cast<double>(kLuminance[0]),
@@ -21,7 +22,7 @@ double LuminanceOf(const Eigen::Vector3d& rgb) {
                                  static_cast<double>(kLuminance[2])));
 }
 
-// One block's equations (1).
+// Normal equations (1) of one block.
 struct BlockNormal {
   Eigen::Matrix3d a = Eigen::Matrix3d::Zero();  // sum of l l^T
   Eigen::Vector3d b = Eigen::Vector3d::Zero();  // sum of l i'
@@ -31,7 +32,7 @@ struct BlockNormal {
 
   void Add(const SheetSample& sample, const Incident& in) {
     if (!(in.e_rgb.minCoeff() > 0.0)) {
-      return;  // behind the light, or no intensity known
+      return;  // behind the light, or without a known intensity
     }
     const double scaled = LuminanceOf(sample.radiance_rgb.cwiseQuotient(in.e_rgb));
     a += in.l * in.l.transpose();
@@ -41,7 +42,7 @@ struct BlockNormal {
     ++lights;
   }
 
-  // How far the solved normal is from the sheet's; nothing where too few lights are seen.
+  // Returns the solved normal less that of the sheet; nothing where too few lights are seen.
   [[nodiscard]] std::optional<Eigen::Vector3d> Deviation() const {
     if (lights < kFewestLightsSeen) {
       return std::nullopt;
@@ -62,7 +63,7 @@ std::vector<BlockNormal> SystemsOf(const SheetReadings& sheet, const IncidentOf&
   return systems;
 }
 
-// The deviations of the blocks of each tile of the table.
+// Deviations of the blocks, tile by tile.
 class Tiles {
  public:
   Tiles(const std::vector<BlockNormal>& systems, double tile_mm) {
@@ -81,7 +82,7 @@ class Tiles {
     }
   }
 
-  // The tiles that are filled well enough to be judged, as the medians of (2).
+  // Returns the medians of (2) of the tiles that are filled well enough.
   [[nodiscard]] std::vector<Eigen::Vector3d> Medians() const {
     size_t fullest = 0;
     for (const std::vector<Eigen::Vector3d>& tile : tiles_) {
@@ -143,14 +144,14 @@ Result<Flatness> FlatnessOf(const SheetReadings& sheet, const IncidentOf& incide
       systems, [](const BlockNormal& system) { return system.Deviation().has_value(); });
   if (seen == systems.end()) {
     return Fail(ErrorCode::kDegenerate,
-                "no part of the sheet is seen under {} lights; need as many to solve for a normal",
+                "no part of the sheet is seen under {} lights; a normal needs that many",
                 kFewestLightsSeen);
   }
   const Eigen::Vector3d normal = seen->normal;
   Flatness flatness;
   for (const Eigen::Vector3d& median : Tiles(systems, options.tile_mm).Medians()) {
     const Eigen::Vector3d n = normal + median;
-    const double angle_rad = std::atan2(n.cross(normal).norm(), n.dot(normal));
+    const double angle_rad = AngleBetweenRad(n, normal);
     flatness.worst_rad = std::max(flatness.worst_rad, angle_rad);
     flatness.rms_rad += angle_rad * angle_rad;
     ++flatness.tiles;

@@ -12,14 +12,14 @@ namespace {
 
 constexpr double kOffSigmas = 5.0;
 constexpr double kLeastShare = 0.004;   // of the sheet's blocks
-constexpr double kShareOfLights = 0.2;  // that must show it, and at least two
+constexpr double kShareOfLights = 0.2;  // of the lights that see a block
 constexpr double kThin = 0.25;          // width over length of a line
 constexpr double kLongOfSheet = 0.4;    // length of a line over the sheet's short side
 constexpr double kRimBlocks = 0.08;     // of the grid's columns and rows
 constexpr double kMostlyRim = 0.6;
-constexpr double kInner = 0.05;  // share cut off at either end of what is measured
+constexpr double kInner = 0.05;  // share of the blocks cut off at either end of an extent
 
-// How far each sample is off the light, in robust standard deviations; the worst of its colours.
+// Returns the deviation of each sample in robust standard deviations, the worst of its colours.
 std::vector<double> OffsetsOf(const std::vector<SheetSample>& samples, const Light& light,
                               double albedo) {
   std::vector<Eigen::Array3d> off;
@@ -45,7 +45,7 @@ std::vector<double> OffsetsOf(const std::vector<SheetSample>& samples, const Lig
   return worst;
 }
 
-// What all lights say of each block.
+// Number of lights per block that see it, and that it deviates from.
 struct Votes {
   std::vector<int> seen;
   std::vector<int> off;
@@ -77,7 +77,7 @@ Votes Count(const SheetReadings& sheet, const Lights& lights, double albedo) {
   return votes;
 }
 
-// Length along the principal axis and width across it, of nine tenths of the points.
+// Returns length along the principal axis and width across it, of nine tenths of the points.
 Eigen::Vector2d ExtentOf(const std::vector<Eigen::Vector2d>& points) {
   Eigen::Vector2d mean = Eigen::Vector2d::Zero();
   for (const Eigen::Vector2d& point : points) {

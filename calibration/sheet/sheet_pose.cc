@@ -4,26 +4,26 @@
 #include <cmath>
 #include <optional>
 
-#include "calibration/fit/robust_spread.h"
 #include "calibration/print/border_view.h"
 #include "calibration/print/print_fit.h"
 #include "core/angle.h"
+#include "core/statistics.h"
 #include "targets/marker_dictionary.h"
 
 namespace sateen {
 namespace {
 
-constexpr double kEnoughPx = 48.0;  // of a marker, beyond which pixels are joined
+constexpr double kEnoughPx = 48.0;  // size of a marker above which pixels are averaged
 constexpr size_t kFewestBorderMarkers = 4;
-constexpr double kFewestInPlace = 0.9;  // of the markers seen
-constexpr double kSlack = 0.15;         // of a marker: how far its corners may lie off
-constexpr double kNotToScale = 0.06;    // of a marker: what no pose explains
-constexpr double kVagueDeg = 0.1;       // standard deviation of the tilt
+constexpr double kFewestInPlace = 0.9;  // share of the markers seen
+constexpr double kSlack = 0.15;         // of a marker: largest deviation of its corners
+constexpr double kNotToScale = 0.06;    // of a marker: deviation that no pose explains
+constexpr double kVagueDeg = 0.1;       // largest standard deviation of the tilt
 constexpr double kQuiet = 0.2;          // of a marker: half of the least gap between two
 constexpr double kMostQuietMm = 3.0;    // within the paper's margin
-constexpr double kCoveredTimes = 3.0;   // the median misfit: a marker that is covered in part
+constexpr double kCoveredTimes = 3.0;   // times the median misfit: a partly covered marker
 constexpr double kCoveredLeast = 0.08;
-constexpr double kMovedTimes = 2.0;  // the median misfit: a frame with the sheet elsewhere
+constexpr double kMovedTimes = 2.0;  // times the median misfit: the sheet is elsewhere
 constexpr double kMovedLeast = 0.12;
 constexpr double kNotThePrint = 0.25;  // misfit
 
@@ -82,7 +82,7 @@ class SheetFitter {
     return frame < names_.size() ? names_[frame] : fmt::format("frame {}", frame);
   }
 
-  // A marker, in pixels.
+  // Returns the side of a marker in the picture.
   [[nodiscard]] double MarkerPx() const {
     return camera_.fx * border_.marker_mm / camera_.table_from_camera.translation().z();
   }
@@ -113,7 +113,7 @@ class SheetFitter {
         view.seen, border_.Text(), kFewestBorderMarkers);
   }
 
-  // Where the mean of the frames is of no use: is that because they show the border elsewhere?
+  // Fails if frames show the border in different places, so that their mean is of no use.
   [[nodiscard]] Status CheckFramesAgree() const {
     std::optional<std::pair<size_t, BorderView>> first;
     for (size_t k = 0; k < frames_.size(); ++k) {

@@ -9,20 +9,20 @@
 #include <random>
 #include <utility>
 
-#include "core/linear_algebra.h"
+#include "core/gauss_newton.h"
+#include "core/statistics.h"
 
 namespace sateen {
 namespace {
 
 constexpr int kTriples = 2000;
-constexpr double kFarthest = 0.16;  // a centre from the rough one, in radii
+constexpr double kFarthest = 0.16;  // distance of a centre from the rough one, in radii
 constexpr int kCircleRounds = 8;
-constexpr double kLeastEdge = 5e-4;         // of full scale, per pixel
-constexpr double kSecondaryEdge = 0.3;      // of the strongest edge along the same radius
-constexpr double kRimMadOfNormal = 1.4826;  // standard deviation over median deviation
-constexpr double kEdgeOutlier = 3.0;        // standard deviations
+constexpr double kLeastEdge = 5e-4;     // of full scale, per pixel
+constexpr double kSecondaryEdge = 0.3;  // of the strongest edge along the same radius
+constexpr double kEdgeOutlier = 3.0;    // standard deviations
 
-// Brightness, between pixels; at the border's value outside.
+// Interpolates the brightness between pixels; outside it is that of the border.
 double SampleAt(const Image<float>& gray, const Eigen::Vector2d& px) {
   const double x = std::clamp(px.x(), 0.0, gray.width - 1.0);
   const double y = std::clamp(px.y(), 0.0, gray.height - 1.0);
@@ -35,7 +35,7 @@ double SampleAt(const Image<float>& gray, const Eigen::Vector2d& px) {
          fy * ((1 - fx) * at(x0, y0 + 1) + fx * at(x0 + 1, y0 + 1));
 }
 
-// The slope along a profile by the derivative of a Gaussian of `sigma` steps.
+// Returns the slope along a profile, by the derivative of a Gaussian of `sigma` steps.
 std::vector<double> SlopesOf(const std::vector<double>& profile, double sigma) {
   const int reach = static_cast<int>(std::ceil(3.0 * sigma));
   std::vector<double> slopes(profile.size(), 0.0);
@@ -67,7 +67,7 @@ std::optional<PlaneCircle> ThroughThree(const Eigen::Vector2d& a, const Eigen::V
   return PlaneCircle{center, (a - center).norm()};
 }
 
-// On how many radii an edge lies within `tolerance` of the circle.
+// Returns the number of radii with an edge within `tolerance` of the circle.
 int RimsSeen(const std::vector<RimEdge>& edges, const PlaneCircle& circle, double tolerance) {
   int seen = 0;
   int last = -1;
@@ -143,8 +143,7 @@ PlaneCircle FitPlaneCircle(std::vector<RimEdge>& edges, PlaneCircle circle, doub
   std::vector<RimEdge> used;
   for (int round = 0; round < kCircleRounds; ++round) {
     used.clear();
-    Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
-    Eigen::Vector3d right = Eigen::Vector3d::Zero();
+    NormalEquations<3> equations;
     std::vector<double> sizes;
     sizes.reserve(edges.size());
     used.reserve(edges.size());
@@ -154,20 +153,17 @@ PlaneCircle FitPlaneCircle(std::vector<RimEdge>& edges, PlaneCircle circle, doub
         continue;
       }
       const Eigen::Vector2d out = (edge.at - circle.center).normalized();
-      const Eigen::Vector3d row(out.x(), out.y(), 1.0);
-      normal += edge.slope * row * row.transpose();
-      right += edge.slope * off * row;
+      equations.Add({out.x(), out.y(), 1.0}, off, edge.slope);
       sizes.push_back(std::abs(off));
       used.push_back(edge);
     }
     if (used.size() < 8) {
       break;
     }
-    const Eigen::Vector3d change = SolveSymmetric(normal, right);
+    const Eigen::Vector3d change = SolveNormal<3>(equations.information, equations.gradient);
     circle.center += change.head<2>();
     circle.radius += change[2];
-    std::ranges::nth_element(sizes, sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2));
-    tolerance = std::clamp(kEdgeOutlier * kRimMadOfNormal * sizes[sizes.size() / 2],
+    tolerance = std::clamp(kEdgeOutlier * kSdPerMad * Median(std::move(sizes)),
                            2e-4 * circle.radius, tolerance);
   }
   edges = std::move(used);

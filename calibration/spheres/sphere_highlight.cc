@@ -7,6 +7,7 @@
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
+#include "core/statistics.h"
 #include "imaging/color.h"
 
 namespace sateen {
@@ -20,7 +21,7 @@ constexpr double kShiftDone = 1e-4;  // [px]
 constexpr std::array<double, 3> kLuma = {0.2989, 0.587, 0.114};
 constexpr double kLumaOfHighlight = 249.5 / 255.0;  // 250 of 255, rounded
 
-// The sphere's interior, cut out of a photograph.
+// Interior of the sphere, cut out of a photograph.
 struct SphereCrop {
   Eigen::Vector2d origin;     // pixel of the crop's (0, 0)
   cv::Mat1f smoothed;         // over a two-hundredth of the radius
@@ -58,7 +59,7 @@ struct LampBlob {
   [[nodiscard]] Eigen::Vector2d Center() const { return weighted / light; }
 };
 
-// The 8-connected blobs above `level`, brightest first.
+// Returns the 8-connected blobs above `level`, brightest first.
 std::vector<LampBlob> BlobsOf(const SphereCrop& crop, float level) {
   cv::Mat1b bright = crop.inside.clone();
   std::transform(crop.smoothed.begin(), crop.smoothed.end(), bright.begin(), bright.begin(),
@@ -76,12 +77,12 @@ std::vector<LampBlob> BlobsOf(const SphereCrop& crop, float level) {
       }
     }
   }
-  blobs.erase(blobs.begin());  // what is not bright
+  blobs.erase(blobs.begin());  // the background
   std::ranges::stable_sort(blobs, std::greater<>(), &LampBlob::light);
   return blobs;
 }
 
-// Equation (2), from `c` on.
+// Solves (2) from `c` on.
 Eigen::Vector2d CenterByMeanShift(const SphereCrop& crop, Eigen::Vector2d c, double s,
                                   double level) {
   const double reach = 4.0 * s;
@@ -126,7 +127,7 @@ Status CheckInside(ImageSize size, const Sphere& sphere, std::string_view frame)
                        sphere.outline.center_px.y());
 }
 
-// Why these blobs are no lamp's, if they are not.
+// Fails if these blobs are not the image of one lamp.
 Status CheckBlobs(const std::vector<LampBlob>& blobs, const SphereCrop& crop,
                   std::string_view frame, const HighlightOptions& options) {
   const double share = blobs[0].pixels / static_cast<double>(crop.values.size());
@@ -176,11 +177,9 @@ Result<Highlight> FindHighlight(const Image<float>& gray, const Sphere& sphere,
       !status) {
     return tl::unexpected(status.error());
   }
-  SphereCrop crop = CropOf(gray, sphere);
-  const auto middle = crop.values.begin() + static_cast<std::ptrdiff_t>(crop.values.size() / 2);
-  std::ranges::nth_element(crop.values, middle);
-  const auto median = static_cast<double>(*middle);
-  const auto peak = static_cast<double>(*std::max_element(middle, crop.values.end()));
+  const SphereCrop crop = CropOf(gray, sphere);
+  const auto median = static_cast<double>(Median(crop.values));
+  const auto peak = static_cast<double>(*std::ranges::max_element(crop.values));
   if (!(peak - median >= options.least_rise)) {
     return Fail(ErrorCode::kDegenerate,
                 "{}: no highlight in the sphere at ({:.0f}, {:.0f}) px: its brightest place has "
@@ -232,11 +231,9 @@ Result<Highlight> MedianHighlight(const Image3& photo, const Sphere& sphere,
                 frame, sphere.outline.center_px.x(), sphere.outline.center_px.y());
   }
   const auto count = static_cast<double>(xs.size());
-  const auto middle = [](std::vector<double>& values) {  // of two, where there are two
-    std::ranges::sort(values);
-    return (values[(values.size() - 1) / 2] + values[values.size() / 2]) / 2.0;
-  };
-  return Highlight{.at_px = {middle(xs), middle(ys)},
+  std::ranges::sort(xs);
+  std::ranges::sort(ys);
+  return Highlight{.at_px = {InterpolatedQuantile(xs, 0.5), InterpolatedQuantile(ys, 0.5)},
                    .peak = kLumaOfHighlight,
                    .radius_px = std::sqrt(count / std::numbers::pi),
                    .area_share = count / pixels,

@@ -9,44 +9,46 @@
 
 namespace sateen {
 
-// A lamp's mirror image in a sphere.
+// Mirror image of a lamp in a sphere.
 struct Highlight {
   Eigen::Vector2d at_px = Eigen::Vector2d::Zero();
   double peak = 0.0;        // smoothed brightness
-  double radius_px = 0.0;   // of the circle as large as the blob
-  double area_share = 0.0;  // of the sphere's disc
-  double runner_up = 0.0;   // light of the next brightest blob over that of this one
+  double radius_px = 0.0;   // radius of a circle of the blob's area
+  double area_share = 0.0;  // area over that of the sphere's disc
+  double runner_up = 0.0;   // light of the second brightest blob over that of this one
 };
 
 struct HighlightOptions {
-  // How far the peak must rise above the sphere's median brightness. Fraction of full scale.
+  // Least rise of the peak above the sphere's median brightness. Fraction of full scale, (0, 1).
   double least_rise = 0.05;
-  // Where a blob begins: this share of the way from the median to the peak, [0.3, 0.95].
+  // Level at which a blob begins, as a share of the way from the median to the peak; [0.3, 0.95].
   double level = 0.9;
-  // The largest blob that is a lamp and no window, as a share of the sphere's disc, (0, 0.5].
+  // Largest area of a lamp as a share of the sphere's disc; a window is larger. (0, 0.5].
   double most_area = 0.02;
-  // A second blob of more than this share of the first one's light makes the frame ambiguous, (0, 1].
+  // Largest light of the second blob as a share of the first one's; above it the frame is
+  // ambiguous. (0, 1].
   double most_runner_up = 0.5;
 
   // Names the first field out of range, with its value and its range.
   [[nodiscard]] Status Validate() const;
 };
 
-/// The lamp's highlight in one sphere: of the connected blobs of pixels above
+/// Finds the lamp's highlight in one sphere. Of the connected blobs of pixels above
 ///
 ///     t = median + level (peak - median)                                                    (1)
 ///
-/// the one of most light sum (i - t), and in it the place that is its own mean in a window half as
-/// wide as the blob,
+/// it is the one with most light, sum (i - t). Its place c is its own mean in a window half as wide
+/// as the blob,
 ///
 ///     c = sum_x g(x - c) w(x) x / sum_x g(x - c) w(x),   w = max(0, i - (median + peak) / 2)   (2)
 ///     g(y) = exp(-|y|^2 / (2 s^2)),   s = max(1.5 px, sqrt(area / pi) / 2)
 ///
-/// The window keeps out what hangs on to a lamp: streaks of a brushed or oily sphere, flare,
+/// The window keeps out what joins a lamp's image: streaks of a brushed or oily sphere, flare,
 /// reflections of the room. Brightness i is smoothed over a two-hundredth of the radius first, so
-/// that one hot pixel is no lamp.
+/// that a hot pixel is no lamp.
 ///
-/// gray     linear, 1 = full scale; `frame` names it in messages
+/// gray     linear, 1 = full scale
+/// frame    its name, for messages
 /// Errors   kInvalidArgument: an option out of range
 ///          kBadData: the sphere is not within the photograph
 ///          kDegenerate: no highlight; one too large for a lamp; two that are alike
@@ -56,9 +58,9 @@ struct HighlightOptions {
                                               std::string_view frame,
                                               const HighlightOptions& options = {});
 
-/// What older toolboxes take for the highlight: the medians of x and of y over all pixels of the
-/// sphere whose luma, 0.2989 R + 0.587 G + 0.114 B of sRGB values, is at least 250 / 255. Every
-/// bright spot of the sphere draws it towards itself, the lamp's image in another sphere too.
+/// Returns the highlight as older toolboxes find it: the medians of x and of y over all pixels of
+/// the sphere whose luma, 0.2989 R + 0.587 G + 0.114 B of sRGB values, is at least 250 / 255. Every
+/// bright spot of the sphere pulls on it, even the lamp's image in another sphere.
 ///
 /// photo    linear, 1 = full scale
 /// Errors   kBadData: the sphere is not within the photograph

@@ -18,7 +18,7 @@ constexpr double kTripleTolerance = 0.006;                      // of the radius
 constexpr double kLeastRadiusPx = 8.0;
 constexpr double kInterior = 0.97;  // of the radius
 
-// The plane of equation (1), or the image itself.
+// Plane of equation (1), or the image itself without a camera.
 class OutlinePlane {
  public:
   OutlinePlane(const std::optional<Camera>& camera, const Eigen::Vector3d& axis)
@@ -41,7 +41,7 @@ class OutlinePlane {
                    : q;
   }
 
-  // The unit ray `angle` off the plane's axis, towards q.
+  // Returns the unit ray at `angle` from the plane's axis, towards q.
   [[nodiscard]] Eigen::Vector3d AtAngle(double angle, const Eigen::Vector2d& q) const {
     const Eigen::Vector2d towards = q.norm() > 0.0 ? q.normalized() : Eigen::Vector2d::UnitX();
     return std::cos(angle) * axis_ + std::sin(angle) * (towards.x() * e1_ + towards.y() * e2_);
@@ -54,7 +54,7 @@ class OutlinePlane {
   Eigen::Vector3d e2_;
 };
 
-// The pixels inside the rim drawn closer to its centroid.
+// Returns the pixels inside the rim after it is shrunk towards its centroid.
 std::vector<PixelSpan> InteriorOf(const std::vector<Eigen::Vector2d>& rim,
                                   const Eigen::Vector2d& centroid) {
   double least = centroid.y();
@@ -82,7 +82,7 @@ std::vector<PixelSpan> InteriorOf(const std::vector<Eigen::Vector2d>& rim,
   return spans;
 }
 
-// A circle of the image as one of the plane, as well as it is one there.
+// Fits a circle of the plane to a circle of the image.
 std::optional<PlaneCircle> InPlane(const OutlinePlane& plane, const Circle& circle) {
   const std::optional<Eigen::Vector2d> center = plane.FromPixel(circle.center_px);
   const PlaneCircle in_image{circle.center_px, circle.radius_px};
@@ -100,7 +100,7 @@ std::optional<PlaneCircle> InPlane(const OutlinePlane& plane, const Circle& circ
   return FitPlaneCircle(rim, {*center, radius}, radius);
 }
 
-// Fills in where the sphere stands, from the circle in the plane.
+// Fills in place and radius of the sphere, from the circle in the plane.
 void Place(const OutlinePlane& plane, const PlaneCircle& circle, const SphereOptions& options,
            Sphere& sphere) {
   if (!options.camera) {
@@ -151,7 +151,7 @@ Status CheckCircle(ImageSize size, const Circle& circle, std::string_view name,
   return {};
 }
 
-// A circle of the plane round the rough one of the image.
+// Plane, and in it the circle of the rough one of the image.
 struct OutlineStart {
   OutlinePlane plane;
   PlaneCircle circle;
@@ -175,7 +175,7 @@ Result<OutlineStart> StartAt(ImageSize size, const Circle& rough, std::string_vi
   return OutlineStart{plane, *circle};
 }
 
-// The sphere whose outline this circle of the plane is.
+// Returns the sphere that has this circle of the plane as its outline.
 Result<Sphere> SphereOf(const OutlinePlane& plane, const PlaneCircle& circle, ImageSize size,
                         std::string_view name, const SphereOptions& options) {
   Sphere sphere;

@@ -11,17 +11,17 @@ namespace {
 constexpr int kSearchSizePx = 256;
 constexpr int kLeastSidePx = 16;
 constexpr int kBins = 72;           // directions round a centre
-constexpr double kLeastSeen = 0.4;  // of them
+constexpr double kLeastSeen = 0.4;  // share of them
 constexpr double kAlikeSeen = 0.8;  // of the best, where their number is not known
 constexpr double kAlikeRadius = 0.5;
 constexpr double kLeastRadius = 0.05;  // of the shorter side
 constexpr double kMostRadius = 0.6;
-constexpr int kCandidates = 40;        // centres that are looked at
+constexpr int kCandidates = 40;        // centres that are tried
 constexpr double kAligned = 0.94;      // cosine between gradient and radius
 constexpr double kStrongShare = 0.12;  // of the pixels, by gradient
 constexpr int kDustShare = 20;
 
-// The picture in blocks of `step`, as square roots, so that dim edges count too.
+// Returns the square roots of the means of blocks of `step` pixels, so that dim edges count, too.
 Image<float> Reduced(const Image<float>& gray, int step) {
   Image<float> small(gray.width / step, gray.height / step);
   const auto block = static_cast<float>(step * step);
@@ -45,7 +45,7 @@ struct GradientEdge {
   double strength;
 };
 
-// The pixels of strong gradient that are the strongest along it.
+// Returns pixels of strong gradient that are the strongest along it.
 std::vector<GradientEdge> GradientEdges(const Image<float>& small) {
   Image<float> strength(small.Size());
   std::vector<Eigen::Vector2d> across(small.pixels.size(), Eigen::Vector2d::Zero());
@@ -84,7 +84,7 @@ std::vector<GradientEdge> GradientEdges(const Image<float>& small) {
   return edges;
 }
 
-// Votes of all edges for the centres along their gradients, both ways.
+// Returns the votes of all edges for centres along their gradients, both ways.
 Image<float> CenterVotes(const std::vector<GradientEdge>& edges, ImageSize size, int least,
                          int most) {
   Image<float> votes(size);
@@ -116,7 +116,7 @@ struct SeenCircle {
   double seen;
 };
 
-// The radius about this centre round which most directions show an edge.
+// Returns the circle about this centre with an edge in most directions.
 SeenCircle BestRadius(const std::vector<GradientEdge>& edges, const Eigen::Vector2d& center,
                       int least, int most) {
   std::vector<std::array<bool, kBins>> hit(static_cast<size_t>(most) + 2);
@@ -148,7 +148,7 @@ bool Overlap(const Circle& a, const Circle& b) {
   return (a.center_px - b.center_px).norm() < 0.9 * std::max(a.radius_px, b.radius_px);
 }
 
-// Pixels 4-connected to (x, y), which are taken out of the mask.
+// Takes the pixels 4-connected to (x, y) out of the mask, and returns them.
 std::vector<Eigen::Vector2i> TakeRegion(Mask& mask, int x, int y) {
   std::vector<Eigen::Vector2i> region = {{x, y}};
   mask.At(x, y) = 0;

@@ -14,7 +14,7 @@ namespace {
 constexpr int kWeightRounds = 20;
 constexpr double kNearlyParallel = 1e-9;  // least over greatest eigenvalue
 
-// The normal matrix of (1) and its right side, with these distances.
+// Normal matrix of (1) and its right side, for given distances.
 struct RayNormal {
   Eigen::Matrix3d matrix = Eigen::Matrix3d::Zero();
   Eigen::Vector3d right = Eigen::Vector3d::Zero();
@@ -34,10 +34,10 @@ RayNormal NormalOf(const std::vector<SphereRay>& rays, const std::vector<double>
 
 struct RayMeeting {
   Eigen::Vector3d at = Eigen::Vector3d::Zero();
-  Eigen::Matrix3d inverse = Eigen::Matrix3d::Zero();  // of the normal matrix
+  Eigen::Matrix3d inverse = Eigen::Matrix3d::Zero();  // inverse of the normal matrix
 };
 
-// Where the rays come closest to each other, by (1). Nothing where that is nowhere before them.
+// Solves (1) for the point where the rays meet. Returns nothing where that is behind one of them.
 std::optional<RayMeeting> MeetingOf(const std::vector<SphereRay>& rays) {
   std::vector<double> distances(rays.size(), 1.0);
   RayMeeting meeting;
@@ -60,7 +60,7 @@ std::optional<RayMeeting> MeetingOf(const std::vector<SphereRay>& rays) {
 }
 
 double SquaredAngle(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
-  const double angle = std::atan2(a.cross(b).norm(), a.dot(b));
+  const double angle = AngleBetweenRad(a, b);
   return angle * angle;
 }
 

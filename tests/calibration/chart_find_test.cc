@@ -35,7 +35,7 @@ Camera Overhead() {
   return camera;
 }
 
-// What the camera sees of the chart on grey, 2 x 2 sites a cell.
+// Chart on grey as the camera sees it, 2 x 2 sites per cell.
 Image<float> CellsOf(const Chart& chart, const Eigen::Isometry2d& table_from_chart) {
   const Camera camera = Overhead();
   Image<float> cells(320, 240);

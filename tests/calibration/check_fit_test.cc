@@ -101,7 +101,7 @@ TEST(FitChange, StandardDeviationsAreThoseOfTheErrors) {
   EXPECT_NEAR(of_camera.Ratio(), 1.0, 0.11);
 }
 
-// What a gain promises, the fit then finds.
+// The fit gains as much as was promised.
 TEST(GainsOf, AreWhatAFitGains) {
   const Rig rig = CalibratedRig(LightModel::kLed);
   Rig actual = rig;

@@ -6,6 +6,7 @@
 
 #include <cmath>
 
+#include "calibration/lights/field_equations.h"
 #include "calibration/lights/light_fit.h"
 #include "rig/projection.h"
 #include "simulation/rigs.h"
@@ -87,8 +88,8 @@ TEST(ShadingOf, IsThatOfTheLightAndItsDerivativesAreNumericOnes) {
   EXPECT_EQ(ShadingOf(sample, led).value, 0.0);  // behind
 }
 
-// The truth of this test: near and led do not explain the light, the field does, and with tilted sheets
-// the light comes out as well as without rings.
+// The truth of this test: near and led do not explain the light, the field does, and with tilted
+// sheets the light comes out as well as without rings.
 TEST(FitField, ExplainsALensThatNearAndLedDoNot) {
   const Light truth = RingedLed();
   const std::vector<SheetSample> samples = SamplesOf(FullCamera(), truth, 5, 21);
@@ -116,8 +117,8 @@ TEST(FitField, ExplainsALensThatNearAndLedDoNot) {
   EXPECT_LT(WorstIrradiance(fit.light, truth, samples), 1e-3);
 }
 
-// What one flat sheet cannot tell stays with the ruler: the light is not moved further than it was off,
-// and all of the sheet is explained.
+// One flat sheet does not tell the position, so the light stays near the ruler, and all of the sheet
+// is explained.
 TEST(FitField, OneFlatSheetLeavesTheLightWithTheRuler) {
   const Light truth = RingedLed();
   const std::vector<SheetSample> samples = SamplesOf(FullCamera(), truth, 1, 22);

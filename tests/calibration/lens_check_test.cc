@@ -1,9 +1,10 @@
+#include "calibration/lens/lens_check.h"
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <limits>
 
-#include "calibration/lens/lens.h"
 #include "core/angle.h"
 
 namespace sateen::lens_check_test {
@@ -13,7 +14,7 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
-// Of eight sharp views, tilted by 20 degrees each way, corners all over the image: nothing to say.
+// Fit of eight sharp views, tilted by 20 degrees each way, with corners all over the image.
 LensFit GoodFit() {
   LensFit fit;
   fit.camera.size_px = {600, 400};
@@ -55,7 +56,7 @@ TEST(WarningsOf, ABlurredViewAgainstTheOthers) {
   LensFit fit = GoodFit();
   fit.views[5].edge_px = 2.1;
   EXPECT_THAT(WarningsOf(fit), ElementsAre(HasSubstr("v5 is blurred: its edges are 2.1 px wide, "
-                                                     "those of half the views 1.0 px")));
+                                                     "those of the median view 1.0 px")));
   fit.views[5].edge_px = 1.9;
   EXPECT_THAT(WarningsOf(fit), IsEmpty());
   for (LensViewReport& view : fit.views) {

@@ -193,7 +193,8 @@ TEST(CalibrateLens, ABentViewIsLeftOutAndNamed) {
 }
 
 // Held out means by a lens that has not seen the view. Five views have 45 parameters for some 200
-// corners each; one view bent by more than noise pulls its own lens, and is explained by others less.
+// corners each; one view bent by more than noise pulls its own lens, and is explained by others
+// less.
 TEST(CalibrateLens, HeldOutViewsAreOfLensesWithoutThem) {
   const Camera truth = LensOf3000Px();
   std::vector<BoardView> views = TiltedViews(truth, Charuco(), 5, 0.1, 21);

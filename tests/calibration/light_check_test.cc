@@ -21,7 +21,7 @@ using ::testing::HasSubstr;
 constexpr int kColumns = ReadingsGrid().columns;
 constexpr int kRows = ReadingsGrid().rows;
 
-// A rig as calibrated, and what it sees today.
+// Rig as it was calibrated, and sheets as it sees them today.
 struct Today {
   Rig rig;
   std::vector<SheetReadings> sheets;
@@ -212,7 +212,7 @@ TEST(LightCheck, PaperAndExposureAreNoLightsFault) {
   EXPECT_NEAR(check.common_flux[0], 0.95, 1e-3);
 }
 
-// A sheet of which every block is changed by what `change` says of its place in [-1, 1]^2 and of the light.
+// Multiplies every block of the first sheet by `change` of its place in [-1, 1]^2 and of the light.
 template <typename Change>
 void Spoil(Today& today, const Change& change) {
   for (size_t k = 0; k < today.rig.lights.size(); ++k) {
@@ -275,8 +275,8 @@ TEST(LightCheck, AFoldIsCountedAndHurtsNoLight) {
   EXPECT_EQ(check.sheets[0].spots, 0.0);
 }
 
-// What a check says of its own errors is measured on a grid of 6 squares, whose scatter it may take
-// for correlation: its standard deviations are up to a tenth too wide.
+// On a grid of 6 squares the check may take their scatter for correlation: its standard deviations
+// are up to a tenth too wide.
 TEST(LightCheck, ErrorsAreWithinTheirStandardDeviations) {
   ActualOverPredicted flux;
   ActualOverPredicted moved;

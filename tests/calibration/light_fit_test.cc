@@ -155,7 +155,7 @@ TEST(FitLight, ErrorsSayWhatToDo) {
   for (SheetSample& sample : samples) {
     sample.radiance_rgb.setZero();
   }
-  EXPECT_THAT(FitLight(samples, truth).error().message, HasSubstr("never lit"));
+  EXPECT_THAT(FitLight(samples, truth).error().message, HasSubstr("never on"));
 }
 
 }  // namespace

@@ -67,7 +67,7 @@ TEST(FindLinearRange, EndsAtTheLastBinWithinItNotAtTheOneThatProvesIt) {
   range = RangeOf(bins);
   EXPECT_TRUE(range.departs);
   EXPECT_NEAR(range.to_dn, 7000.0 + 2000.0 * 10.0 / 30.0, 1e-9);
-  // With nothing brighter that is within it, the last that tells counts.
+  // The last certain bin counts if no brighter one is within the tolerance.
   bins = ExactBins();
   bins[9] = {.level_dn = 10000.0, .deviation = 0.0104, .sd = 4e-4};
   range = RangeOf(bins);

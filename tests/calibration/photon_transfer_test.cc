@@ -25,8 +25,8 @@ std::vector<TransferPoint> PointsAt(double dark_dn, double lit_dn, int repeats) 
   return points;
 }
 
-// A variance v of n sites has the standard deviation v sqrt(2 / (n - 1)); a line through two levels is
-// known as well as these.
+// A variance v of n sites has the standard deviation v sqrt(2 / (n - 1)); a line through two levels
+// is known as well as these.
 TEST(FitPhotonTransfer, ExactPointsGiveTheLineAndItsStandardDeviations) {
   constexpr int kRepeats = 4;
   constexpr double kMean = 1000.0;

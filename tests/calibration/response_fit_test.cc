@@ -281,7 +281,7 @@ TEST(ResponseFit, AnUnevenPatchIsLeftOutAndNamed) {
 
 TEST(ResponseFit, ASensorThatCutsOffBelowBlackIsWarnedOf) {
   const ResponseFit fit = MustFit({.black_dn = 0.0});
-  EXPECT_THAT(fit.warnings, ::testing::Contains(HasSubstr("cuts off what lies below black")));
+  EXPECT_THAT(fit.warnings, ::testing::Contains(HasSubstr("cuts off values below black")));
   // From the lit pairs alone.
   EXPECT_NEAR(fit.transfer->gain_dn_per_electron, 0.4, 0.012);
 }
@@ -291,7 +291,7 @@ TEST(ResponseFit, WithoutASaturatedPatchTheFilesWhiteStands) {
   EXPECT_FALSE(fit.saturation_dn);
   EXPECT_EQ(fit.white_dn, 16383.0);
   EXPECT_THAT(fit.warnings, ::testing::Contains(HasSubstr("no patch is saturated")));
-  EXPECT_THAT(fit.warnings, ::testing::Contains(HasSubstr("linearity was looked at up to")));
+  EXPECT_THAT(fit.warnings, ::testing::Contains(HasSubstr("linearity is tested up to")));
 }
 
 TEST(ResponseFit, EqualFramesHaveNoNoiseToMeasure) {

@@ -163,8 +163,8 @@ TEST(SeedProcedure, OneIntensityALightLeavesManyDegrees) {
   EXPECT_GT(worst_deg, 5.0);
 }
 
-// To the letter: the sheet itself comes out flat, the light stays where the ruler put it, and a sheet
-// that is tilted shows it.
+// To the letter: the sheet itself comes out flat, the light stays where the ruler put it, and a
+// sheet that is tilted shows it.
 TEST(SeedProcedure, TheEquationLeavesTheLightWhereItWas) {
   const TwoSheets sheets(1.0);
   const std::vector<SeedLight> unsmoothed = sheets.Calibrate({.smoothing_passes = 0});
@@ -209,7 +209,7 @@ TEST(SeedProcedure, TheFallOffIsLedAstrayByAnLed) {
   EXPECT_GT(sheets.WorstDeg(sheets.tilted, lights), 0.3);
 }
 
-// What is linear over the blocks must not be bent at the border: that is where errors show.
+// A map that is linear over the blocks must not be bent at the border, where errors show.
 TEST(SeedProcedure, SmoothingKeepsALinearMap) {
   constexpr int kColumns = 7;
   constexpr int kRows = 5;

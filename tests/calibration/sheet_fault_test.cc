@@ -89,7 +89,7 @@ TEST(FindSheetFault, AStainIsASpot) {
   EXPECT_NEAR(fault->center_mm.y(), 20.0, 1.0);
 }
 
-// What one light alone shows is not the paper's.
+// A deviation under one light alone is not the paper's fault.
 TEST(FindSheetFault, AShadowOfOneLightIsNone) {
   EXPECT_FALSE(FaultOf(SheetWith([](size_t light, SheetSample& sample) {
     if (light == 2 && sample.point_mm.x() < -60.0) {

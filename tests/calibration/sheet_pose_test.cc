@@ -105,7 +105,7 @@ class FitSheetPoseTest : public ::testing::Test {
 std::vector<Lie>* FitSheetPoseTest::lies_ = nullptr;
 std::vector<std::vector<Image<float>>>* FitSheetPoseTest::frames_ = nullptr;
 
-// Of a small rotation and shift of the table frame, w and d of SheetPose::covariance.
+// Returns w and d of SheetPose::covariance from the found pose to the truth.
 Eigen::Matrix<double, 6, 1> StepFrom(const Eigen::Isometry3d& found,
                                      const Eigen::Isometry3d& truth) {
   const Eigen::AngleAxisd turn(truth.linear() * found.linear().transpose());

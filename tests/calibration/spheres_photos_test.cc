@@ -43,7 +43,7 @@ Directions PublishedDirections(const fs::path& folder) {
   return directions;
 }
 
-// What Xiong marked by hand: 1-based, y up.
+// Circles that Xiong marked by hand: 1-based, y up.
 Circle PublishedCircle(const fs::path& folder, int height) {
   std::ifstream file(folder / "circle_data.txt");
   Circle circle;
@@ -86,9 +86,10 @@ Directions DirectionsOf(const Sphere& sphere, const std::vector<Eigen::Vector2d>
   return directions;
 }
 
-// The two spheres of a set stand in one photograph of 3888 x 2592 px, of which the probes are cut out; the
-// focal length is not published, 31000 px fit. With it the rays of both must meet in one lamp, and
-// how far they miss says which circles and which highlights are right, without anybody's answers.
+// The two spheres of a set stand in one photograph of 3888 x 2592 px, of which the probes are cut
+// out; the focal length is not published, 31000 px fit. With it the rays of both must meet in one
+// lamp, and how far they miss says which circles and which highlights are right, without anybody's
+// answers.
 double MissDeg(const std::array<Probe, 2>& probes, bool marked, bool medians) {
   constexpr double kFocalPx = 31000.0;
   constexpr std::array<double, 2> kLeft = {100.0, 2600.0};
@@ -117,10 +118,10 @@ double MissDeg(const std::array<Probe, 2>& probes, bool marked, bool medians) {
   return std::sqrt(squares / kFrames) / kRadPerDeg;
 }
 
-// With the published definition of the highlight: the published answers again, from the circles marked
-// by hand to the rounding of a pixel (0.22 degrees), and from the found ones within the bar. That
-// definition counts every bright spot, and where the other sphere mirrors the lamp, that spot draws the
-// median by 2 px; so ours differs, and its rays meet better.
+// With the published definition of the highlight: the published answers again, from the circles
+// marked by hand to the rounding of a pixel (0.22 degrees), and from the found ones within the bar.
+// Every bright spot counts in that definition: the lamp's image in the other sphere pulls the median
+// by 2 px. So ours differs, and its rays meet better.
 TEST(SpheresPhotos, HarvardDirections) {
   SATEEN_NEEDS_DATA("harvard-psd");
   for (const char* object : {"cat", "frog"}) {

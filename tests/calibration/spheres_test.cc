@@ -112,9 +112,9 @@ TEST(Spheres, DirectionsAndPositions) {
              worst_mm);
 }
 
-// A brushed sphere draws a streak from the lamp's image to one side, nearly as bright and a fifth of the
-// radius long. It may turn the light by no more than a pixel, 0.8 degrees; the blob's centroid, at the
-// same level as the window, turns it by more.
+// A brushed sphere draws a streak from the lamp's image to one side, nearly as bright and a fifth
+// of the radius long. It may turn the light by no more than a pixel, 0.8 degrees; the blob's
+// centroid, at the same level as the window, turns it by more.
 TEST(Spheres, AStreakDoesNotDrawTheHighlight) {
   const Sphere sphere = SphereFromCircle({{200.0, 200.0}, 150.0}, {400, 400}, "frame").value();
   Image<float> frame(400, 400, 0.02F);

@@ -28,8 +28,8 @@ inline Image<uint8_t> GreyFile(const std::filesystem::path& path) {
   return grey;
 }
 
-// What the lens sees of a plane whose print `white_at` (in its millimetres) says 0 to 1: 34 rays
-// a pixel, in a Fibonacci lattice, whose shadow on each side has 34 places too, so that edges along
+// Renders a plane whose print is `white_at` (in its millimetres), 0 to 1, through the lens: 34 rays
+// per pixel, in a Fibonacci lattice, whose shadow on each side has 34 places too, so that edges along
 // the rows come out as smooth as others; and noise of `noise_dn` grey levels. Where the rays meet
 // the plane is interpolated between the pixel's corners, which no lens bends enough to be seen.
 inline Image<uint8_t> PictureOf(const Camera& lens, const Eigen::Isometry3d& camera_from_plane,

@@ -62,7 +62,7 @@ TEST(BalanceLights, TheScatterOfPatchesCountsWhereItIsLarger) {
   EXPECT_EQ(balance.patches, 2U);
 }
 
-// Of three patches in a row the mean is known to their scatter over sqrt(3 (3 - 1)).
+// The mean of three patches is known to their scatter over sqrt(3 (3 - 1)).
 TEST(BalanceLights, TheMeanOfThreePatchesIsKnownBetterThanOne) {
   std::vector<PatchSample> samples;
   const Eigen::Vector3d noise(1e-4, 1e-4, 1e-4);
