@@ -179,7 +179,7 @@ PrintState StateAt(const std::vector<Patch>& patches, const Eigen::Isometry3d& p
   return state;
 }
 
-NormalEquations<kPrintUnknowns> EquationsOf(const PrintState& state) {
+NormalEquations<kPrintUnknowns> PrintEquations(const PrintState& state) {
   NormalEquations<kPrintUnknowns> all;
   for (const PatchSums& one : state.sums) {
     all.information += one.equations.information;
@@ -192,7 +192,7 @@ NormalEquations<kPrintUnknowns> EquationsOf(const PrintState& state) {
 GaussNewtonFit<kPrintUnknowns, PrintState> Descend(const std::vector<Patch>& patches,
                                                    const Eigen::Isometry3d& start) {
   return MinimizeSquares<kPrintUnknowns>(
-      StateAt(patches, start, std::log(kStartBlurPx)), EquationsOf,
+      StateAt(patches, start, std::log(kStartBlurPx)), PrintEquations,
       [&](const PrintState& at, const PrintUnknowns& step) {
         return StateAt(patches, Moved(at.pose, step.head<6>()),
                        at.log_blur + std::clamp(step[6], -0.5, 0.5));
