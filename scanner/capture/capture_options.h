@@ -4,8 +4,7 @@
 #include <optional>
 
 #include "core/error.h"
-#include "scanner/checks/frame_check.h"
-#include "scanner/devices/tethered_camera.h"
+#include "scanner/checks/frame_check_options.h"
 #include "scanner/sessions/session.h"
 
 namespace sateen {

@@ -155,6 +155,7 @@ void CaptureSession::Tell(const Tools& tools, const char* stage, const std::stri
 
 Result<CaptureCheck> CaptureSession::CheckAll() {
   CaptureLooks looks;
+  bool has_first_dark = false;
   for (std::size_t frame = 0; frame < looks_.size(); ++frame) {
     const SessionFrame& done = *journal_.done[frame];
     if (!IsBase(frame)) {
@@ -171,13 +172,14 @@ Result<CaptureCheck> CaptureSession::CheckAll() {
       }
       looks_[frame] = *std::move(look);
     }
-    const FrameLook* look = &*looks_[frame];
+    const FrameLook& look = *looks_[frame];
     if (done.role == FrameRole::kLit) {
       looks.lit.push_back(look);
     } else if (done.role == FrameRole::kRepeat) {
       looks.repeat = look;
     } else {
-      (looks.dark_first == nullptr ? looks.dark_first : looks.dark_last) = look;
+      (has_first_dark ? looks.dark_last : looks.dark_first) = look;
+      has_first_dark = true;
     }
   }
   return CheckCapture(rig_, looks, options_.checks);

@@ -14,7 +14,7 @@
 #include "rig/rig.h"
 #include "scanner/capture/capture_options.h"
 #include "scanner/capture/journal.h"
-#include "scanner/checks/frame_check.h"
+#include "scanner/checks/capture_check.h"
 #include "scanner/devices/light_board.h"
 #include "scanner/devices/tethered_camera.h"
 

@@ -6,31 +6,17 @@
 #include <utility>
 
 #include "rig/projection.h"
+#include "scanner/checks/light_patterns.h"
 #include "scanner/checks/shade_check.h"
 
 namespace sateen {
 namespace {
 
-// e l of a light where a pixel sees the table; zero where it does not. Without a pose of the camera,
-// at the table's origin.
-Eigen::Vector3d LightAt(const Rig& rig, const Light& light, const Eigen::Vector2d& px) {
-  Eigen::Vector3d x_mm = Eigen::Vector3d::Zero();
-  if (rig.camera && rig.camera->has_pose) {
-    const std::optional<Eigen::Vector3d> seen = TablePointOfPixel(*rig.camera, px.x(), px.y());
-    if (!seen) {
-      return Eigen::Vector3d::Zero();
-    }
-    x_mm = *seen;
-  }
-  const Incident incident = IncidentAt(light, x_mm);
-  return incident.e_rgb.sum() * incident.l;
-}
-
 bool IsFar(const Shift& shift, const FrameCheckOptions& options) {
   return IsSignificant(shift) && shift.px.norm() > options.max_shift_px;
 }
 
-// "from the frame of light 'b' on", or "in the frames of lights 'b', 'c'".
+// Returns "from the frame of light 'b' on" or "in the frames of lights 'b', 'c'".
 std::string WhichFrames(const Rig& rig, const std::vector<Shift>& shifts, size_t first,
                         const FrameCheckOptions& options) {
   const size_t repeat = shifts.size() - 1;
@@ -49,10 +35,10 @@ std::string WhichFrames(const Rig& rig, const std::vector<Shift>& shifts, size_t
       names += fmt::format("{}'{}'", names.empty() ? "" : ", ", rig.lights[k].name);
     }
   }
-  return "in frames of the lights " + names;
+  return "in the frames of lights " + names;
 }
 
-// "at the left", "in the middle".
+// Returns "at the left", "in the middle" ...
 std::string WhereInPicture(const Eigen::Vector2d& place) {
   constexpr double kThird = 1.0 / 3.0;
   const std::string row = place.y() < kThird ? "top" : place.y() > 2.0 * kThird ? "bottom" : "";
@@ -63,30 +49,19 @@ std::string WhereInPicture(const Eigen::Vector2d& place) {
   return "at the " + row + (row.empty() || column.empty() ? "" : " ") + column;
 }
 
-CaptureFault OtherLightFault(const Rig& rig, size_t light, size_t other) {
-  return {.kind = CaptureFaultKind::kOtherLight,
-          .lights = {light},
-          .text = fmt::format(
-              "the frame of light '{}' is lit from where the rig has light '{}'; are they swapped? "
-              "Check the channels of both ({} and {})",
-              rig.lights[light].name, rig.lights[other].name, rig.lights[light].channel,
-              rig.lights[other].channel)};
-}
-
 CaptureFault ShadeFault(const Rig& rig, size_t light, const Shade& shade) {
   return {.kind = CaptureFaultKind::kShaded,
           .lights = {light},
           .text = fmt::format(
-              "a shadow lies on the frame of light '{}', {}: {:.0f} % of the picture have {:.0f} % "
-              "less light than the other frames say; keep out of the light, and see that nothing "
+              "a shadow lies on the frame of light '{}', {}: {:.0f} % of the picture is {:.0f} % "
+              "darker than the other frames predict; keep out of the light, and see that nothing "
               "hangs into it",
               rig.lights[light].name, WhereInPicture(shade.middle), 100.0 * shade.share,
               100.0 * shade.depth)};
 }
 
 FramesToShade BlocksOf(const Rig& rig, const BlockMeans& means,
-                       const std::vector<std::vector<double>>& signal,
-                       const std::vector<size_t>& of) {
+                       const std::vector<BlockField>& signal, const std::vector<size_t>& of) {
   FramesToShade frames{.grid = means.grid};
   for (const size_t light : of) {
     frames.signal.push_back(signal[light]);
@@ -100,17 +75,17 @@ FramesToShade BlocksOf(const Rig& rig, const BlockMeans& means,
       frames.view.push_back(x_mm ? Eigen::Vector3d((eye_mm - *x_mm).normalized())
                                  : Eigen::Vector3d::UnitZ());
       for (size_t frame = 0; frame < of.size(); ++frame) {
-        frames.light[frame].push_back(LightAt(rig, rig.lights[of[frame]], px));
+        frames.light[frame].push_back(LightAtPixel(rig, rig.lights[of[frame]], px));
       }
     }
   }
   return frames;
 }
 
-// The light that a frame has to be given for all of them to be explained far better.
+// A light that explains all frames far better if a frame is given its direction.
 struct OtherLight {
   size_t frame = 0;
-  bool is_swapped = false;  // that frame has to be given this one's
+  bool is_swapped = false;  // and the light's own frame has to be given this frame's
 };
 
 std::optional<OtherLight> OtherLightOf(size_t frame, const FrameCheckOptions& options,
@@ -142,26 +117,35 @@ std::optional<OtherLight> OtherLightOf(size_t frame, const FrameCheckOptions& op
 
 }  // namespace
 
+CaptureFault OtherLightFault(const Rig& rig, size_t light, size_t other) {
+  return {.kind = CaptureFaultKind::kOtherLight,
+          .lights = {light},
+          .text = fmt::format(
+              "the frame of light '{}' is lit from the position of light '{}'; are they swapped? "
+              "Check the channels of both ({} and {})",
+              rig.lights[light].name, rig.lights[other].name, rig.lights[light].channel,
+              rig.lights[other].channel)};
+}
+
 std::vector<Shift> ShiftsOf(const Rig& rig, const CaptureLooks& looks, const std::vector<bool>& on,
                             const FrameCheckOptions& options) {
   FramesToRegister input;
   std::vector<size_t> of;  // which light each frame is of
   for (size_t k = 0; k < looks.lit.size(); ++k) {
     if (on[k]) {
-      input.frames.push_back(&looks.lit[k]->middle);
+      input.frames.push_back(looks.lit[k].middle);
       of.push_back(k);
     }
   }
   if (!on[0]) {
     return {};
   }
-  input.frames.push_back(&looks.repeat->middle);
+  input.frames.push_back(looks.repeat.middle);
   of.push_back(0);
-  const PixelPlace origin =
-      OriginOfMiddle(looks.repeat->means.size_px, looks.repeat->middle.Size());
-  input.light = [&](size_t frame, const Eigen::Vector2d& cell) {
+  const PixelPlace origin = OriginOfMiddle(looks.repeat.means.size_px, looks.repeat.middle.Size());
+  input.light = [rig, of, origin](size_t frame, const Eigen::Vector2d& cell) {
     const Eigen::Vector2d px(origin.x + 2.0 * cell.x() + 0.5, origin.y + 2.0 * cell.y() + 0.5);
-    return LightAt(rig, rig.lights[of[frame]], px);
+    return LightAtPixel(rig, rig.lights[of[frame]], px);
   };
   const std::vector<Shift> found = RegisterFrames(input, options.min_shift_peak);
   if (!std::isfinite(found.back().sd_px)) {
@@ -186,9 +170,8 @@ std::optional<CaptureFault> MovedFault(const Rig& rig, const std::vector<Shift>&
   return CaptureFault{
       .kind = CaptureFaultKind::kMoved,
       .text = fmt::format(
-          "the picture has moved by {:.1f} px ({:+.1f} right, {:+.1f} down) {}; at most {:g} px "
-          "may "
-          "be: make camera and fabric fast, check the calibration, and capture every frame again",
+          "the picture has moved by {:.1f} px ({:+.1f} right, {:+.1f} down) {}, more than {:g} px; "
+          "fix camera and fabric, check the calibration, and capture every frame again",
           px.norm(), px.x(), px.y(),
           WhichFrames(rig, shifts, static_cast<size_t>(first - shifts.begin()), options),
           options.max_shift_px)};
@@ -204,7 +187,7 @@ std::optional<size_t> OnlyOneThatMoved(const std::vector<Shift>& shifts,
 }
 
 std::vector<CaptureFault> ShadedFaults(const Rig& rig, const CaptureLooks& looks,
-                                       const std::vector<std::vector<double>>& signal,
+                                       const std::vector<BlockField>& signal,
                                        const std::vector<bool>& on,
                                        const FrameCheckOptions& options, double min_light) {
   if (!rig.camera || !rig.camera->has_pose) {
@@ -216,7 +199,7 @@ std::vector<CaptureFault> ShadedFaults(const Rig& rig, const CaptureLooks& looks
       of.push_back(k);
     }
   }
-  FramesToShade frames = BlocksOf(rig, looks.lit[0]->means, signal, of);
+  FramesToShade frames = BlocksOf(rig, looks.lit[0].means, signal, of);
   const std::vector<std::optional<Shade>> shades = FindShades(frames, options.min_shade);
   std::vector<CaptureFault> faults;
   for (size_t frame = 0; frame < shades.size(); ++frame) {

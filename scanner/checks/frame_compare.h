@@ -5,7 +5,8 @@
 #include <vector>
 
 #include "rig/rig.h"
-#include "scanner/checks/frame_check.h"
+#include "scanner/checks/capture_check.h"
+#include "scanner/checks/light_patterns.h"
 
 // The parts of CheckCapture() that lay frames over each other. `on`: the lights that are on, alone.
 namespace sateen {
@@ -24,11 +25,14 @@ namespace sateen {
 [[nodiscard]] std::optional<std::size_t> OnlyOneThatMoved(const std::vector<Shift>& shifts,
                                                           const FrameCheckOptions& options);
 
+// kOtherLight: the frame of `light` is lit from where the rig has `other`.
+[[nodiscard]] CaptureFault OtherLightFault(const Rig& rig, std::size_t light, std::size_t other);
+
 // kShaded, of one light each; kOtherLight where they have changed places, or one is lit as another is,
 // which on cloth that does not lie flat only normals show. `signal`: [light][block], dark subtracted.
 // Shadows that take less than `min_light` of all the light of a frame are left aside.
 [[nodiscard]] std::vector<CaptureFault> ShadedFaults(const Rig& rig, const CaptureLooks& looks,
-                                                     const std::vector<std::vector<double>>& signal,
+                                                     const std::vector<BlockField>& signal,
                                                      const std::vector<bool>& on,
                                                      const FrameCheckOptions& options,
                                                      double min_light = 0.0);

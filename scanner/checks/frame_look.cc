@@ -1,3 +1,5 @@
+#include "scanner/checks/frame_look.h"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -6,7 +8,6 @@
 
 #include "imaging/image_io.h"
 #include "imaging/raw.h"
-#include "scanner/checks/frame_check.h"
 #include "scanner/sessions/frame_loader.h"
 #include "scanner/sessions/sensor_reading.h"
 
@@ -17,7 +18,7 @@ constexpr BlockGrid kCheckGrid = {.columns = 24, .rows = 16};
 constexpr int kSitesOfBlock = 4;   // fewest, along each side
 constexpr int kMiddleCells = 512;  // along each side of the middle, at most
 
-// The grid of the checks, or as much of it as a small picture has room for.
+// Returns the grid of the checks, coarser where a small picture has no room for it.
 BlockGrid GridOf(const Rig& rig) {
   if (!rig.camera) {
     return kCheckGrid;
@@ -27,7 +28,7 @@ BlockGrid GridOf(const Rig& rig) {
           .rows = std::clamp(size.height / kSitesOfBlock, 1, kCheckGrid.rows)};
 }
 
-// Everything that the checks want of a frame, from one decoding of it.
+// Reads everything that the checks need of a frame, decoding it once.
 Result<FrameLook> LookAt(const FrameFile& file, const BlockGrid& grid) {
   if (IsRawName(file.path)) {
     return ReadRawMosaic(file.path).and_then([&](const RawMosaic& mosaic) {
@@ -115,11 +116,11 @@ Result<FrameLook> CheckFrame(const FrameFile& file, const Rig& rig,
                 name, *means.exposure_s, settings.exposure_s);
   }
   if (look->levels.saturated > options.max_saturated) {
-    return Fail(ErrorCode::kBadData,
-                "{}: {:.2g} % of its sites are saturated; at most {:.2g} % may be: expose shorter "
-                "than {:.4g} s, or dim the lights with --level",
-                name, 100.0 * look->levels.saturated, 100.0 * options.max_saturated,
-                settings.exposure_s);
+    return Fail(
+        ErrorCode::kBadData,
+        "{}: {:.2g} % of its pixels are saturated, more than {:.2g} %; expose for less than "
+        "{:.4g} s, or dim the lights with --level",
+        name, 100.0 * look->levels.saturated, 100.0 * options.max_saturated, settings.exposure_s);
   }
   if (role == FrameRole::kDark) {
     look->middle = {};

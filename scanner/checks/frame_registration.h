@@ -21,7 +21,7 @@ struct Shift {
 
 // Frames to be laid over each other: pictures of one size in cells of 2 x 2 px.
 struct FramesToRegister {
-  std::vector<const Image<float>*> frames;  // not finite where saturated
+  std::vector<Image<float>> frames;  // not finite where saturated
   // e_k l_k of frame k at a place in cells; zero where not known. Rough is good enough.
   std::function<Eigen::Vector3d(std::size_t k, const Eigen::Vector2d& cell)> light;
 };
@@ -48,10 +48,8 @@ struct FramesToRegister {
 /// model misses, not only noise.
 ///
 /// The highlights of a glossy yarn wander with the light, all frames alike, and a nudge is a jump
-/// between two frames. So what the jumps between frames have in common with those of the light is
-/// taken out, and what is left of it added to the standard deviation:
-///
-///     d_k -= B (l_k - l_1),   min over B of sum_k |(d_k - d_k-1) - B (l_k - l_k-1)|,  l in x, y (4)
+/// between two frames: what the jumps between frames have in common with those of the light is taken
+/// out (TakeOutGloss).
 ///
 /// Returns  one for each frame; the first is zero. sd_px is infinite where nothing can be told: first
 ///          and last frame correlate by less than `min_peak`, or less than that share of the frames'
@@ -65,16 +63,5 @@ struct FramesToRegister {
 ///          illumination and viewpoint", ICCV 2007. To solve all shifts and the lights' errors
 ///          together in the null space, without normals, is ours.
 [[nodiscard]] std::vector<Shift> RegisterFrames(const FramesToRegister& input, double min_peak);
-
-// How far the second picture lies from the first, both lit alike, and how sure that is: the
-// correlation there, 1 at most.
-struct Correlation {
-  Eigen::Vector2d px = Eigen::Vector2d::Zero();
-  double peak = 0.0;
-};
-
-/// The highest cross-correlation of both pictures, less their Gaussian blur, over all shifts, and the
-/// top of the parabola through it and its neighbours.
-[[nodiscard]] Correlation ShiftBetween(const Image<float>& first, const Image<float>& second);
 
 }  // namespace sateen

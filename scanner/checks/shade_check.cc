@@ -21,7 +21,6 @@ constexpr double kPlaneError = 0.04;  // from the middle to the border, by a wro
 constexpr double kNoise = 0.02;       // of a block, for the ridge that holds the plane
 constexpr Eigen::Index kTerms = 9;    // of f: a cubic without its constant
 
-using BlockField = std::vector<double>;  // one value a block, NaN where unknown
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
 double Quantile(std::vector<double> values, double share) {

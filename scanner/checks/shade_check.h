@@ -4,6 +4,7 @@
 #include <optional>
 #include <vector>
 
+#include "scanner/checks/light_patterns.h"
 #include "scanner/sessions/block_means.h"
 
 namespace sateen {
@@ -11,7 +12,7 @@ namespace sateen {
 // Frames as block brightness, dark subtracted, with what the rig says of the light there.
 struct FramesToShade {
   BlockGrid grid;
-  std::vector<std::vector<double>> signal;          // [frame][block]
+  std::vector<BlockField> signal;                   // [frame][block]
   std::vector<std::vector<Eigen::Vector3d>> light;  // e l, likewise; zero where not known
   std::vector<Eigen::Vector3d> view;                // [block]: unit vector to the camera
 };

@@ -7,15 +7,9 @@
 #include <vector>
 
 #include "core/error.h"
+#include "imaging/exposure_settings.h"
 
 namespace sateen {
-
-// What a frame is exposed with.
-struct ExposureSettings {
-  double exposure_s = 0.02;
-  double f_number = 8.0;
-  double iso = 100.0;
-};
 
 struct CameraInfo {
   std::string model;    // as the camera says it

@@ -1,10 +1,9 @@
-#include "scanner/checks/frame_check.h"
-
 #include <gmock/gmock.h>
 
 #include <filesystem>
 
 #include "imaging/dng.h"
+#include "scanner/checks/capture_check.h"
 #include "tests/scanner/checks/simulated_faults.h"
 #include "tests/scanner/sessions/dataset_files.h"
 
@@ -25,7 +24,7 @@ class CheckCaptureCase : public ::testing::Test {
  protected:
   CheckCaptureCase() : looks_(fabric_, 3) {}
   CaptureCheck Check(const FrameCheckOptions& options = {}) {
-    return CheckCapture(rig_, looks_.Looks(), options);
+    return CheckCapture(rig_, looks_, options);
   }
   Rig rig_ = CalibratedRig();
   inline static const Fabric fabric_ = Fabric("print", CalibratedRig(), kNudgePx);  // for all cases
@@ -45,14 +44,14 @@ TEST_F(CheckCaptureCase, FindsALightThatIsLitTwice) {
   const CaptureCheck check = Check();
   ASSERT_THAT(check.faults, SizeIs(1));
   EXPECT_THAT(check.faults[0].text,
-              HasSubstr("the frame of light 'led-2' is lit from where the rig has light 'led-6'"));
+              HasSubstr("the frame of light 'led-2' is lit from the position of light 'led-6'"));
 }
 
 TEST_F(CheckCaptureCase, SaysWhichFrameMovedAndCameBack) {
   looks_.lit[4] = LookAt(fabric_.nudged[4], 1);
   const CaptureCheck check = Check();
   ASSERT_THAT(check.faults, SizeIs(1));
-  EXPECT_THAT(check.faults[0].text, HasSubstr("in frames of the lights 'led-4'"));
+  EXPECT_THAT(check.faults[0].text, HasSubstr("in the frames of lights 'led-4'"));
 }
 
 TEST(RecordShifts, WritesWhatIsSignificantToFramesOfTheStack) {
@@ -110,7 +109,7 @@ class CheckRawFrames : public ::testing::Test {
   FrameLook Look(const Image3& radiance, const std::string& name, FrameRole role) {
     Sensor sensor = *SensorNamed("nikon-d5100");
     sensor.full_scale = 1.5;
-    const Image<uint16_t> mosaic = *Expose(sensor, radiance, HashOf(5, looks_.size()));
+    const Image<uint16_t> mosaic = *Expose(sensor, radiance, HashOf(5, seen_++));
     const std::filesystem::path path = temp_.Path() / (name + ".dng");
     EXPECT_TRUE(WriteDng(path, mosaic,
                          {.cfa = sensor.cfa,
@@ -123,21 +122,19 @@ class CheckRawFrames : public ::testing::Test {
     return look.value_or(FrameLook());
   }
   CaptureCheck Check(const std::vector<Image3>& lit, const Image3& repeat, const Image3& dark) {
-    looks_.clear();
+    seen_ = 0;
+    CaptureLooks looks;
     for (size_t k = 0; k < lit.size(); ++k) {
-      looks_.push_back(Look(lit[k], fmt::format("{}", k), FrameRole::kLit));
+      looks.lit.push_back(Look(lit[k], fmt::format("{}", k), FrameRole::kLit));
     }
-    const FrameLook dark_look = Look(dark, "dark", FrameRole::kDark);
-    const FrameLook repeat_look = Look(repeat, "again", FrameRole::kRepeat);
-    CaptureLooks looks{.dark_first = &dark_look, .dark_last = &dark_look, .repeat = &repeat_look};
-    for (const FrameLook& look : looks_) {
-      looks.lit.push_back(&look);
-    }
+    looks.dark_first = Look(dark, "dark", FrameRole::kDark);
+    looks.dark_last = looks.dark_first;
+    looks.repeat = Look(repeat, "again", FrameRole::kRepeat);
     return CheckCapture(rig_, looks, {});
   }
   testing::TempFolder temp_;
   Rig rig_ = CalibratedRig();
-  std::vector<FrameLook> looks_;
+  uint64_t seen_ = 0;  // frames, each with noise of its own
 };
 
 TEST_F(CheckRawFrames, FindTheSame) {

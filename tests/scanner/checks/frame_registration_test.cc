@@ -5,6 +5,8 @@
 #include <cmath>
 
 #include "scanner/checks/frame_compare.h"
+#include "scanner/checks/gloss_shift.h"
+#include "scanner/checks/shift_correlation.h"
 #include "scanner/sessions/frame_shift.h"
 #include "solver/evaluate.h"
 #include "solver/lambertian.h"
@@ -58,10 +60,7 @@ struct Cloth {
     return incident.e_rgb[1] * incident.l;
   }
   [[nodiscard]] std::vector<Shift> Register(const Rig& said, double min_peak = 0.1) const {
-    FramesToRegister input;
-    for (const Image<float>& image : images) {
-      input.frames.push_back(&image);
-    }
+    FramesToRegister input{.frames = images};
     input.light = [&](size_t k, const Eigen::Vector2d& cell) { return LightAt(said, k, cell); };
     return RegisterFrames(input, min_peak);
   }
@@ -105,22 +104,30 @@ TEST(RegisterFrames, FindsOneFrameThatMovedAndCameBack) {
   EXPECT_LT(WorstError(cloth.Register(cloth.rig), truth), 0.05);
 }
 
-// The standard deviation is that of many sessions: noise alone, at 5 % of the brightness.
+// Standard deviations are those of many sessions: noise alone, at 5 % of the brightness. 40 seeds of
+// two axes know the ratio of one frame to 8 %, that of the nine others to 3 %.
 TEST(RegisterFrames, KnowsHowSureItIs) {
   const std::vector<Eigen::Vector2d> truth = NudgedFrom(5, {0.4, 0.0});
-  double sum2 = 0.0;
+  double actual2 = 0.0;
   double predicted2 = 0.0;
-  for (uint64_t seed = 0; seed < 12; ++seed) {
+  double actual2_of_repeat = 0.0;
+  double predicted2_of_repeat = 0.0;
+  for (uint64_t seed = 0; seed < 40; ++seed) {
     const Cloth cloth(truth, 0.025, seed);
     const std::vector<Shift> found = cloth.Register(cloth.rig);
-    for (size_t k = 1; k < kFrames; ++k) {
-      sum2 += (found[k].px - truth[k]).squaredNorm();
+    for (size_t k = 1; k + 1 < kFrames; ++k) {
+      actual2 += (found[k].px - truth[k]).squaredNorm();
       predicted2 += found[k].sd_px * found[k].sd_px;
     }
+    actual2_of_repeat += (found.back().px - truth.back()).squaredNorm();
+    predicted2_of_repeat += found.back().sd_px * found.back().sd_px;
   }
-  fmt::print("actual over predicted standard deviation: {:.2f}\n", std::sqrt(sum2 / predicted2));
-  EXPECT_LT(std::sqrt(sum2 / predicted2), 2.0);
-  EXPECT_GT(std::sqrt(sum2 / predicted2), 0.4);
+  const double ratio = std::sqrt(predicted2 / actual2);
+  const double ratio_of_repeat = std::sqrt(predicted2_of_repeat / actual2_of_repeat);
+  fmt::print("predicted over actual standard deviation: {:.3f}, of the repeat {:.3f}\n", ratio,
+             ratio_of_repeat);
+  EXPECT_NEAR(ratio, 1.0, 0.08);
+  EXPECT_NEAR(ratio_of_repeat, 1.0, 0.16);
 }
 
 TEST(RegisterFrames, LeavesAsideWhatIsSaturatedOrShaded) {
@@ -180,8 +187,7 @@ TEST(LayOverFirst, MendsTheNormalsOfANudgedSession) {
   fabric.Bin();
   testing::SessionLooks looks(fabric, 1);
   looks.Nudge(fabric, 5, 1);
-  const std::vector<Shift> shifts =
-      ShiftsOf(rig, looks.Looks(), std::vector<bool>(kLookLights, true), {});
+  const std::vector<Shift> shifts = ShiftsOf(rig, looks, std::vector<bool>(kLookLights, true), {});
   ASSERT_EQ(shifts.size(), kFrames);
   const auto error_of = [&](bool nudged, bool corrected) {
     LightStack stack;

@@ -136,7 +136,7 @@ inline void ExpectFaultsAreFound(const std::vector<std::string>& fabrics, uint64
       const uint64_t seed = HashOf(1, first_seed + static_cast<uint64_t>(clean.sessions));
       const Rig rig = i / 2 % 2 == 0 ? calibrated : RoughRig(calibrated, kRulerMm, seed);
       const SessionLooks looks(fabric, seed);
-      clean.Add(name, CheckCapture(rig, looks.Looks(), {}));
+      clean.Add(name, CheckCapture(rig, looks, {}));
       if (i % 2 == 1) {
         continue;
       }
@@ -144,7 +144,7 @@ inline void ExpectFaultsAreFound(const std::vector<std::string>& fabrics, uint64
         SessionLooks damaged = looks;
         const CaptureFault wanted = rate.damage(fabric, damaged, seed);
         const CaptureCheck found =
-            CheckCapture(rate.needs_calibration ? calibrated : rig, damaged.Looks(), {});
+            CheckCapture(rate.needs_calibration ? calibrated : rig, damaged, {});
         rate.found += Found(found, wanted) ? 1 : 0;
         ++rate.sessions;
         if (!Found(found, wanted)) {

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "reflectance/specular.h"
-#include "scanner/checks/frame_check.h"
+#include "scanner/checks/capture_check.h"
 #include "simulation/random.h"
 #include "simulation/render.h"
 #include "simulation/rigs.h"
@@ -174,7 +174,7 @@ inline FrameLook LookAt(const Image3& radiance, uint64_t seed) {
 }
 
 // The looks of one session; what a fault changes is put in place of it.
-struct SessionLooks {
+struct SessionLooks : CaptureLooks {
   SessionLooks(const Fabric& fabric, uint64_t seed) {
     for (size_t k = 0; k < kLookLights; ++k) {
       lit.push_back(LookAt(fabric.lit[k], HashOf(seed, k)));
@@ -183,13 +183,6 @@ struct SessionLooks {
     dark_last = LookAt(fabric.dark, HashOf(seed, 101));
     repeat = LookAt(fabric.lit[0], HashOf(seed, 102));
   }
-  [[nodiscard]] CaptureLooks Looks() const {
-    CaptureLooks looks{.dark_first = &dark_first, .dark_last = &dark_last, .repeat = &repeat};
-    for (const FrameLook& look : lit) {
-      looks.lit.push_back(&look);
-    }
-    return looks;
-  }
   // Camera or fabric are nudged before the frame of light `from`; kLookLights: before the repeat.
   void Nudge(const Fabric& fabric, size_t from, uint64_t seed) {
     for (size_t k = from; k < kLookLights; ++k) {
@@ -197,10 +190,6 @@ struct SessionLooks {
     }
     repeat = LookAt(fabric.nudged[0], HashOf(seed, 399));
   }
-  std::vector<FrameLook> lit;
-  FrameLook dark_first;
-  FrameLook dark_last;
-  FrameLook repeat;
 };
 
 // The shadow of a passer-by: a disc, half a plane or a strip with soft edges, over `share` of the

@@ -366,8 +366,8 @@ TEST_F(CaptureTest, SwappedLightsAreNamedAndOnlyTheyAreTakenAgain) {
   camera_.image_of_channel = {0, 1, 7, 3, 4, 5, 6, 2, 8, 9};
   const Error error = ErrorOf(Begin());
   EXPECT_THAT(error, IsError(ErrorCode::kBadData,
-                             "frame of light 'led-2' is lit from where the rig has light 'led-7'"));
-  EXPECT_THAT(error.message, HasSubstr("'led-7' is lit from where the rig has light 'led-2'"));
+                             "frame of light 'led-2' is lit from the position of light 'led-7'"));
+  EXPECT_THAT(error.message, HasSubstr("'led-7' is lit from the position of light 'led-2'"));
   camera_.image_of_channel.clear();  // mended
   const Result<CaptureSummary> resumed = Resume();
   ASSERT_TRUE(resumed) << resumed.error().message;

@@ -1,23 +1,23 @@
-#include "scanner/checks/frame_check.h"
+#include "scanner/checks/capture_check.h"
 
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <optional>
 
 #include "rig/projection.h"
 #include "scanner/checks/frame_compare.h"
+#include "scanner/checks/light_patterns.h"
 
 namespace sateen {
 namespace {
 
 constexpr double kFitsAsWell = 5.0;   // times the usual misfit of a frame at its own light
-constexpr double kMisleading = 0.02;  // of a frame's light: less looks like nothing but a shadow
+constexpr double kMisleading = 0.02;  // share of a frame's light: less looks like a shadow alone
 constexpr double kDoubled = 1.4;      // a level from which on another light may be on too
 
-using Field = std::vector<double>;  // one value a block
-
-Field BrightnessOf(const FrameLook& look) {
-  Field field;
+BlockField BrightnessOf(const FrameLook& look) {
+  BlockField field;
   field.reserve(look.means.blocks.size());
   for (const BlockMean& block : look.means.blocks) {
     field.push_back(block.radiance_rgb.sum());
@@ -25,9 +25,9 @@ Field BrightnessOf(const FrameLook& look) {
   return field;
 }
 
-double Sum(const Field& field) { return std::accumulate(field.begin(), field.end(), 0.0); }
+double Sum(const BlockField& field) { return std::accumulate(field.begin(), field.end(), 0.0); }
 
-Field Less(Field field, const Field& other) {
+BlockField Less(BlockField field, const BlockField& other) {
   std::ranges::transform(field, other, field.begin(), std::minus<>());
   return field;
 }
@@ -42,23 +42,26 @@ class CaptureChecker {
  public:
   CaptureChecker(const Rig& rig, const CaptureLooks& looks, const FrameCheckOptions& options)
       : rig_(rig), looks_(looks), options_(options) {
-    const Field dark = BrightnessOf(*looks.dark_first);
-    for (const FrameLook* look : looks.lit) {
-      signal_.push_back(Less(BrightnessOf(*look), dark));
+    const BlockField dark = BrightnessOf(looks.dark_first);
+    for (const FrameLook& look : looks.lit) {
+      signal_.push_back(Less(BrightnessOf(look), dark));
     }
     Predict();
   }
 
   CaptureCheck Check() {
     CheckAmbient();
-    check_.drift = Sum(Less(BrightnessOf(*looks_.repeat), BrightnessOf(*looks_.dark_first))) /
-                       Sum(signal_[0]) -
-                   1.0;
+    check_.drift =
+        Sum(Less(BrightnessOf(looks_.repeat), BrightnessOf(looks_.dark_first))) / Sum(signal_[0]) -
+        1.0;
     FindLevels();
     if (!check_.faults.empty()) {
       return std::move(check_);  // what every frame suffers from would look like faults of lights
     }
     FindDark();
+    if (has_pattern_) {
+      patterns_.emplace(signal_, predicted_, on_);
+    }
     CheckPatterns();
     if (check_.faults.empty()) {
       CheckShifts();
@@ -76,15 +79,15 @@ class CaptureChecker {
   }
 
  private:
-  // E of (1); of one everywhere where the rig does not say.
+  // Computes E of (1): 1 everywhere where the rig does not say.
   void Predict() {
-    const BlockMeans& means = looks_.lit[0]->means;
+    const BlockMeans& means = looks_.lit[0].means;
     const bool has_pose = rig_.camera && rig_.camera->has_pose;
     has_pattern_ = has_pose && std::ranges::any_of(rig_.lights, [](const Light& light) {
                      return light.model != LightModel::kDistant;
                    });
     for (const Light& light : rig_.lights) {
-      Field field;
+      BlockField field;
       for (int row = 0; row < means.grid.rows; ++row) {
         for (int column = 0; column < means.grid.columns; ++column) {
           field.push_back(PredictAt(light, means.Center(column, row), has_pose));
@@ -94,9 +97,10 @@ class CaptureChecker {
     }
     if (!has_pattern_) {
       check_.notes.emplace_back(
-          has_pose ? "the lights are distant ones, which look alike: swapped lights are not found"
-                   : "the rig has no pose of its camera: swapped lights are not found, nor is a "
-                     "shadow on one frame");
+          has_pose
+              ? "the lights are distant and look alike: swapped lights are not found"
+              : "the rig's camera has no pose: swapped lights are not found, nor are shadows on "
+                "one frame");
     }
   }
 
@@ -104,28 +108,22 @@ class CaptureChecker {
     if (!has_pose && light.model != LightModel::kDistant) {
       return 1.0;
     }
-    const std::optional<Eigen::Vector3d> x_mm =
-        has_pose ? TablePointOfPixel(*rig_.camera, px.x(), px.y()) : Eigen::Vector3d::Zero();
-    if (!x_mm) {
-      return 0.0;
-    }
-    const Incident incident = IncidentAt(light, *x_mm);
-    return incident.e_rgb.sum() * std::max(0.0, incident.l.z());
+    return std::max(0.0, LightAtPixel(rig_, light, px).z());
   }
 
   void CheckAmbient() {
     std::vector<double> sums;
     std::ranges::transform(signal_, std::back_inserter(sums), Sum);
     const double change =
-        Sum(Less(BrightnessOf(*looks_.dark_last), BrightnessOf(*looks_.dark_first)));
+        Sum(Less(BrightnessOf(looks_.dark_last), BrightnessOf(looks_.dark_first)));
     check_.ambient = change / std::max(Median(sums), 1e-30);
     if (std::abs(check_.ambient) > options_.max_ambient) {
       check_.faults.push_back(
           {.kind = CaptureFaultKind::kAmbient,
            .text = fmt::format(
-               "ambient light has changed by {:+.1f} % of what the lights give, between the dark "
-               "frame at the start and the one at the end; at most {:.1f} % may be: keep the room "
-               "as it is, and capture every frame again",
+               "ambient light changed by {:+.1f} % of the lights' brightness between the first and "
+               "the last dark frame, more than {:.1f} %; keep the room light constant and capture "
+               "every frame again",
                100.0 * check_.ambient, 100.0 * options_.max_ambient)});
     }
   }
@@ -133,14 +131,13 @@ class CaptureChecker {
   void CheckShifts() {
     check_.shifts = ShiftsOf(rig_, looks_, on_, options_);
     if (check_.shifts.empty()) {
-      check_.notes.emplace_back(
-          "too little texture to tell whether the camera has moved meanwhile");
+      check_.notes.emplace_back("too little texture to tell whether the camera moved");
     } else if (std::optional<CaptureFault> moved = MovedFault(rig_, check_.shifts, options_)) {
       check_.faults.push_back(*std::move(moved));
     }
   }
 
-  // The one light whose frame alone is said to be another light's, or to have moved and come back:
+  // Returns the light if one frame alone seems to be another light's, or to have moved and come back:
   // the edge of a shadow can look like both.
   [[nodiscard]] std::optional<size_t> SuspectOf(const CaptureCheck& check) const {
     if (check.faults.size() != 1) {
@@ -152,7 +149,7 @@ class CaptureChecker {
                                                        : std::nullopt;
   }
 
-  // A shaded light is no other one, nor dim.
+  // Adds shaded lights. A frame that a shadow explains is neither another light's nor dim.
   void CheckShades() {
     const std::optional<size_t> suspect = SuspectOf(check_);
     std::vector<CaptureFault> shaded =
@@ -193,10 +190,11 @@ class CaptureChecker {
       const double level = check_.levels[k];
       if (!(level >= options_.min_level)) {  // also NaN
         on_[k] = false;
-        AddFault(CaptureFaultKind::kDark, {k},
-                 fmt::format("light '{}' was not on: its frame has {:.0f} % of the light that the "
-                             "rig says; check its cable: sateen light {}",
-                             rig_.lights[k].name, 100.0 * level, rig_.lights[k].channel));
+        AddFault(
+            CaptureFaultKind::kDark, {k},
+            fmt::format("light '{}' was off: its frame has {:.0f} % of the brightness that the "
+                        "rig predicts; check its cable: sateen light {}",
+                        rig_.lights[k].name, 100.0 * level, rig_.lights[k].channel));
       } else if (level > kDoubled) {
         on_[k] = false;
       }
@@ -211,132 +209,48 @@ class CaptureChecker {
       if (on_[k] && !is_explained_[k] && std::abs(level - 1.0) > change) {
         AddFault(
             CaptureFaultKind::kLevel, {k},
-            fmt::format("light '{}' has {:.0f} % of the light that the rig says, against the "
-                        "others; at most {:.0f} % may be between: check the light and what may "
-                        "shade it, or calibrate anew",
+            fmt::format("light '{}' has {:.0f} % of its brightness relative to the calibration, a "
+                        "change of more than {:.0f} %; check the light and what may shade it, or "
+                        "calibrate again",
                         rig_.lights[k].name, 100.0 * level, 100.0 * change));
       }
     }
     for (size_t k = 0; k < signal_.size(); ++k) {
       if (check_.levels[k] > kDoubled) {
         AddFault(CaptureFaultKind::kLevel, {k},
-                 fmt::format("light '{}' has {:.0f} % of the light that the rig says{}: more than "
-                             "one light was on; check the wiring of its channel {}",
+                 fmt::format("light '{}' has {:.0f} % of the brightness that the rig predicts{}: "
+                             "more than one light was on; check the wiring of its channel {}",
                              rig_.lights[k].name, 100.0 * check_.levels[k], SecondLight(k),
                              rig_.lights[k].channel));
       }
     }
   }
 
-  // Median log of all lights that are on, block by block: one shaded frame must not bend the others.
-  [[nodiscard]] Field MedianLog(const std::vector<Field>& all) const {
-    Field median;
-    for (size_t b = 0; b < all[0].size(); ++b) {
-      std::vector<double> logs;
-      for (size_t k = 0; k < all.size(); ++k) {
-        if (on_[k]) {
-          logs.push_back(std::log(std::max(all[k][b], 1e-30)));
-        }
-      }
-      median.push_back(Median(std::move(logs)));
-    }
-    return median;
-  }
-
-  // (3); not finite where a value is not above 0.
-  static Field Pattern(Field field, const Field& median_log) {
-    std::ranges::transform(field, median_log, field.begin(),
-                           [](double value, double median) { return std::log(value) - median; });
-    return field;
-  }
-
-  // (4), over the blocks where both are known.
-  static double Misfit(const Field& q, const Field& r) {
-    double sum = 0.0;
-    double sum2 = 0.0;
-    double count = 0.0;
-    for (size_t b = 0; b < q.size(); ++b) {
-      const double difference = q[b] - r[b];
-      if (std::isfinite(difference)) {
-        sum += difference;
-        sum2 += difference * difference;
-        count += 1.0;
-      }
-    }
-    return count > 0.0 ? sum2 / count - sum / count * (sum / count) : 0.0;
-  }
-
-  // ", as if light 'b' were on too", where the pattern tells.
+  // Returns ", as if light 'b' were on too" where the pattern tells.
   [[nodiscard]] std::string SecondLight(size_t k) const {
-    if (!has_pattern_) {
-      return "";
-    }
-    const Field q = Pattern(signal_[k], MedianLog(signal_));
-    const Field median_predicted = MedianLog(predicted_);
-    size_t best = k;
-    double least = 0.0;
-    for (size_t j = 0; j < predicted_.size(); ++j) {
-      Field both = predicted_[k];
-      std::ranges::transform(both, predicted_[j], both.begin(), std::plus<>());
-      const double misfit = Misfit(q, Pattern(both, median_predicted));
-      if (j != k && (best == k || misfit < least)) {
-        best = j;
-        least = misfit;
-      }
-    }
-    return best == k ? "" : fmt::format(", as if light '{}' were on too", rig_.lights[best].name);
-  }
-
-  // Misfit (4) of a frame at its own light, and at the light where it is least.
-  struct Fit {
-    double own = 0.0;
-    double least = 0.0;
-    size_t best = 0;
-  };
-
-  static Fit FitOf(size_t k, const Field& q, const std::vector<Field>& patterns) {
-    const double own = Misfit(q, patterns[k]);
-    Fit fit{.own = own, .least = own, .best = k};
-    for (size_t j = 0; j < patterns.size(); ++j) {
-      const double misfit = Misfit(q, patterns[j]);
-      if (misfit < fit.least) {
-        fit.best = j;
-        fit.least = misfit;
-      }
-    }
-    return fit;
+    const std::optional<size_t> second = patterns_ ? patterns_->SecondLight(k) : std::nullopt;
+    return second ? fmt::format(", as if light '{}' were on too", rig_.lights[*second].name) : "";
   }
 
   void CheckPatterns() {
-    if (!has_pattern_ || std::ranges::count(on_, true) < 2) {
+    if (!patterns_ || std::ranges::count(on_, true) < 2) {
       return;
     }
-    const Field median_signal = MedianLog(signal_);
-    const Field median_predicted = MedianLog(predicted_);
-    std::vector<Field> patterns;
-    for (const Field& field : predicted_) {
-      patterns.push_back(Pattern(field, median_predicted));
-    }
-    std::vector<Fit> fits(signal_.size());
+    std::vector<LightPatterns::Fit> fits(signal_.size());
     std::vector<double> own;
     for (size_t k = 0; k < signal_.size(); ++k) {
       if (on_[k]) {
-        fits[k] = FitOf(k, Pattern(signal_[k], median_signal), patterns);
+        fits[k] = patterns_->FitOf(k);
         own.push_back(fits[k].own);
       }
     }
     const double usual = Median(own);
     for (size_t k = 0; k < signal_.size(); ++k) {
-      const Fit& fit = fits[k];
+      const LightPatterns::Fit& fit = fits[k];
       // A shaded frame fits no light; a frame of another light fits that one as well as others theirs.
       if (on_[k] && fit.best != k && fit.least < options_.other_light_misfit * fit.own &&
           fit.least < kFitsAsWell * usual) {
-        AddFault(
-            CaptureFaultKind::kOtherLight, {k},
-            fmt::format("the frame of light '{}' is lit from where the rig has light '{}'; are "
-                        "they swapped? Check the channels of both ({} and {})",
-                        rig_.lights[k].name, rig_.lights[fit.best].name, rig_.lights[k].channel,
-                        rig_.lights[fit.best].channel));
+        check_.faults.push_back(OtherLightFault(rig_, k, fit.best));
       }
     }
   }
@@ -345,36 +259,15 @@ class CaptureChecker {
   const CaptureLooks& looks_;
   const FrameCheckOptions& options_;
   bool has_pattern_ = false;
-  std::vector<Field> signal_;     // s of (1)
-  std::vector<Field> predicted_;  // E of (1)
-  std::vector<bool> on_;          // one light, alone
+  std::vector<BlockField> signal_;     // s of (1)
+  std::vector<BlockField> predicted_;  // E of (1)
+  std::vector<bool> on_;               // one light, alone
   std::vector<bool> is_explained_;
+  std::optional<LightPatterns> patterns_;  // where the rig tells lights apart
   CaptureCheck check_;
 };
 
 }  // namespace
-
-Status FrameCheckOptions::Validate() const {
-  struct Range {
-    const char* name;
-    double value;
-    double most;
-  };
-  for (const auto& [name, value, most] :
-       {Range{"max_saturated", max_saturated, 1.0}, Range{"min_level", min_level, 1.0},
-        Range{"max_level_change", max_level_change, 1.0},
-        Range{"max_rough_level_change", max_rough_level_change, 1.0},
-        Range{"other_light_misfit", other_light_misfit, 1.0},
-        Range{"max_ambient", max_ambient, 1.0}, Range{"max_drift", max_drift, 1.0},
-        Range{"max_shift_px", max_shift_px, 100.0}, Range{"min_shift_peak", min_shift_peak, 1.0},
-        Range{"min_shade", min_shade, 1.0}, Range{"max_exposure_error", max_exposure_error, 1.0}}) {
-    if (!(value > 0.0 && value <= most)) {
-      return Fail(ErrorCode::kInvalidArgument, "{} is {}; need more than 0 and at most {:g}", name,
-                  value, most);
-    }
-  }
-  return {};
-}
 
 CaptureCheck CheckCapture(const Rig& rig, const CaptureLooks& looks,
                           const FrameCheckOptions& options) {

@@ -1,9 +1,9 @@
+#include "scanner/checks/shift_correlation.h"
+
 #include <algorithm>
 #include <cmath>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
-
-#include "scanner/checks/frame_registration.h"
 
 namespace sateen {
 namespace {

@@ -1,0 +1,12 @@
+#pragma once
+
+namespace sateen {
+
+// What a camera exposes a frame with.
+struct ExposureSettings {
+  double exposure_s = 0.02;
+  double f_number = 8.0;
+  double iso = 100.0;
+};
+
+}  // namespace sateen
