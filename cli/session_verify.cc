@@ -4,7 +4,7 @@
 #include <nlohmann/json.hpp>
 #include <ostream>
 
-#include "scanner/capture/capture_session.h"
+#include "scanner/capture/session_proof.h"
 
 namespace sateen::cli {
 

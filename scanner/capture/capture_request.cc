@@ -4,7 +4,7 @@
 #include <cmath>
 #include <system_error>
 
-#include "scanner/sessions/files/folder_listing.h"
+#include "scanner/capture/session_folder.h"
 
 namespace sateen {
 namespace {
@@ -14,7 +14,7 @@ namespace fs = std::filesystem;
 constexpr std::uintmax_t kBytesOfSite = 2;  // RAW without compression
 constexpr ImageSize kUnknownSize = {6000, 4000};
 
-// Of the folder that is there, or will be.
+// Returns the free space for a folder that exists or is to be created.
 std::uintmax_t FreeBytes(const fs::path& dir) {
   std::error_code error;
   fs::path existing = fs::absolute(dir, error);
@@ -42,7 +42,7 @@ Status CheckRoom(const Rig& rig, std::size_t frames, const fs::path& dir) {
   return {};
 }
 
-// Each light of the rig is one that the board can switch, at that level and for that long.
+// Fails unless the board can switch each light of the rig, at that level and for that long.
 Status CheckChannels(const Rig& rig, const LightBoard& board, double level,
                      const CaptureOptions& options) {
   const std::vector<LightLimits>& limits = board.Info().lights;
@@ -50,7 +50,7 @@ Status CheckChannels(const Rig& rig, const LightBoard& board, double level,
     if (light.channel < 0 || static_cast<std::size_t>(light.channel) >= limits.size()) {
       return Fail(ErrorCode::kBadData,
                   "light '{}' of the rig is on channel {}, but the board at {} has channels 0 to "
-                  "{}; mend the rig, or flash the firmware for 16 lights",
+                  "{}; correct the rig, or flash the firmware for 16 lights",
                   light.name, light.channel, board.PortName(), limits.size() - 1);
     }
     const double most = limits[static_cast<std::size_t>(light.channel)].max_level;
@@ -89,7 +89,7 @@ Result<OpenDevices> OpenFor(const Rig& rig, double level, const CaptureOptions& 
   return devices.Camera().map([&](TetheredCamera* camera) { return OpenDevices{*board, camera}; });
 }
 
-// With what the journal says on resuming.
+// Returns the options with the exposure of the journal.
 CaptureOptions OptionsOf(const CaptureSession& session, const CaptureRequest& request) {
   CaptureOptions options = request.options;
   options.exposure_s = session.AskedExposure();
@@ -107,26 +107,24 @@ Result<CaptureSession> BeginOrResume(const CaptureRequest& request) {
   return changed ? std::move(session) : tl::unexpected(changed.error());
 }
 
-// Before a folder is made that a capture without devices would leave behind.
+// Opens the devices before a folder is created that a capture without devices would leave behind.
 Result<OpenDevices> OpenBefore(const CaptureRequest& request, RigDevices& devices) {
-  return CaptureSession::CheckBegin(request.output, request.rig, request.options)
-      .and_then([&](const Rig& rig) {
-        return CheckRoom(rig, PlanOf(rig, {1.0}).size(), request.output).and_then([&] {
-          return OpenFor(rig, request.options.level, request.options, devices);
-        });
-      });
+  return CheckBegin(request.output, request.rig, request.options).and_then([&](const Rig& rig) {
+    return CheckRoom(rig, PlanOf(rig, {1.0}).size(), request.output).and_then([&] {
+      return OpenFor(rig, request.options.level, request.options, devices);
+    });
+  });
 }
 
 }  // namespace
 
 Status CheckCapture(const CaptureRequest& request) {
   if (!request.resume) {
-    return CaptureSession::CheckBegin(request.output, request.rig, request.options)
-        .map([](const Rig&) {});
+    return CheckBegin(request.output, request.rig, request.options).map([](const Rig&) {});
   }
-  return CaptureSession::CheckResume(request.output).and_then([&](const Journal& journal) {
+  return CheckResume(request.output).and_then([&](const Journal& journal) {
     return request.new_exposure && journal.complete
-               ? CaptureSession::CompleteSession(request.output)
+               ? Status(tl::unexpected(CompleteSessionError(request.output)))
                : Status();
   });
 }
@@ -158,7 +156,7 @@ Result<CaptureSummary> RunCapture(const CaptureRequest& request, RigDevices& dev
 }
 
 Result<CaptureForecast> ForecastCapture(const CaptureRequest& request, RigDevices& devices) {
-  const Result<Rig> rig = CaptureSession::CheckBegin(request.output, request.rig, request.options);
+  const Result<Rig> rig = CheckBegin(request.output, request.rig, request.options);
   if (!rig) {
     return tl::unexpected(rig.error());
   }

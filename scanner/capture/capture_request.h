@@ -12,44 +12,44 @@
 
 namespace sateen {
 
-// One capture as an operator asks for it, by `sateen capture` or of the daemon.
+// One capture as an operator asks for it, with `sateen capture` or through the daemon.
 struct CaptureRequest {
-  std::filesystem::path rig;     // not on resuming: the session has its own
+  std::filesystem::path rig;     // not used on resuming: the session has its own
   std::filesystem::path output;  // folder of the session
   bool resume = false;
-  // On resuming: every frame again, at the exposure of `options`, which is found where it has none.
+  // On resuming: take every frame again, at the exposure of `options`; it is found where absent.
   bool new_exposure = false;
   CaptureOptions options;
 };
 
 /// Begins or resumes a session and takes it to its end with the devices, which it opens first where
-/// they are not. However it ends, all lights are off.
+/// they are not. In every case all lights are off at the end.
 ///
 /// Errors   as CaptureSession; kDevice where no board or no camera is found
 [[nodiscard]] Result<CaptureSummary> RunCapture(const CaptureRequest& request, RigDevices& devices,
                                                 const Task& task,
                                                 const CaptureObserver& observer = {});
 
-// What it would be refused for before a device is opened: rig, folder, options.
+// Fails if the request would be refused before a device is opened: for its rig, folder or options.
 [[nodiscard]] Status CheckCapture(const CaptureRequest& request);
 
-// What a capture would do, without taking a frame or writing a file: --dry-run.
+// Forecast of a capture that takes no frame and writes no file: --dry-run.
 struct CaptureForecast {
   CaptureRequest request;
   FramePlan plan;               // at one exposure where it is still to be found
-  bool exposure_known = false;  // asked for
+  bool exposure_known = false;  // given by hand
   std::string port;             // of the board
   std::string firmware;
   CameraInfo camera;
   ExposureSettings settings;  // as the camera has them now
-  std::uintmax_t bytes = 0;   // about, that the session takes
+  std::uintmax_t bytes = 0;   // approximate size of the session
   std::uintmax_t free_bytes = 0;
 };
 
-/// Looks whether the capture could begin: rig, devices, settings, channels of the board, room on the
-/// disk. Sets the camera; the lights stay off.
+/// Checks whether the capture can begin: rig, devices, settings, channels of the board, free space.
+/// Sets the camera; the lights stay off.
 ///
-/// Errors   those that the capture would begin with
+/// Errors   those with which the capture would end before its first frame
 [[nodiscard]] Result<CaptureForecast> ForecastCapture(const CaptureRequest& request,
                                                       RigDevices& devices);
 

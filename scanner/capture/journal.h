@@ -7,31 +7,27 @@
 #include <vector>
 
 #include "core/error.h"
-#include "scanner/devices/tethered_camera.h"
+#include "scanner/capture/frame_plan.h"
 #include "scanner/sessions/session.h"
 
 namespace sateen {
 
-// The frames that a capture takes, in this order: role, light and exposure_s, the rest is not known yet.
-using FramePlan = std::vector<SessionFrame>;
-
-// What a capture set out to do: the first record of its journal.
+// First record of a journal: the options that decide about the frames.
 struct JournalBegun {
   SessionKind kind = SessionKind::kFabric;
   std::string rig;  // relative to the session's folder
   std::string rig_sha256;
-  std::optional<double>
-      exposure_s;  // as asked of the camera, the latest time; nothing: to be found
+  std::optional<double> exposure_s;  // asked for most recently; absent: to be found
   double f_number = 8.0;
   double iso = 100.0;
   double level = 1.0;  // of the lights
-  int brackets = 3;    // exposures a light, at most, where they are to be found
+  int brackets = 3;    // largest number of exposures per light where they are to be found
 };
 
-// With a plan: whether another exposure than before was asked for; nothing: to be found.
+// Exposure that was asked for with a plan.
 struct PlannedExposure {
-  bool is_new = false;
-  std::optional<double> exposure_s;
+  bool is_new = false;               // false: as before
+  std::optional<double> exposure_s;  // absent: to be found
 };
 
 /// journal.jsonl of a session that is being captured, one JSON object a line, each on the disk before

@@ -27,8 +27,8 @@ class LightsOff {
   LightBoard& board_;
 };
 
-// Speaks to the board while the camera exposes, so that it keeps the light on; turns the light off
-// at once where the capture is cancelled. The board is its alone until Stop().
+// Talks to the board while the camera exposes, so that it keeps the light on, and turns the light off
+// at once if the capture is cancelled. Nobody else uses the board until Stop().
 class KeepAlive {
  public:
   KeepAlive(LightBoard& board, milliseconds interval, const Task& task)
@@ -89,20 +89,19 @@ class KeepAlive {
   std::thread thread_;
 };
 
-// The board's word that this light alone is on, or none.
-Status ConfirmLit(const Light* light, const BoardState& state, const char* when) {
-  const unsigned wanted = light == nullptr ? 0U : 1U << static_cast<unsigned>(light->channel);
+// Fails unless the board says that this light alone is on, or none.
+Status ConfirmLit(const std::optional<Light>& light, const BoardState& state, const char* when) {
+  const unsigned wanted = light ? 1U << static_cast<unsigned>(light->channel) : 0U;
   if (state.lit == wanted) {
     return {};
   }
-  const std::string what =
-      light == nullptr ? "no light" : fmt::format("light '{}' alone", light->name);
-  return Fail(
-      ErrorCode::kDevice, "{} should be on {}, but the board says that channels {:#06x} are{}",
-      what, when, state.lit,
-      state.fault != 0 ? fmt::format(" (fault {}: {})", state.fault, FaultText(state.fault))
-      : light != nullptr && state.lit == 0 ? "; did the camera take longer than --margin allows?"
-                                           : "");
+  const std::string what = light ? fmt::format("light '{}' alone", light->name) : "no light";
+  return Fail(ErrorCode::kDevice,
+              "{} should be on {}, but the board says that channels {:#06x} are{}", what, when,
+              state.lit,
+              state.fault != 0 ? fmt::format(" (fault {}: {})", state.fault, FaultText(state.fault))
+              : light && state.lit == 0 ? "; did the camera take longer than --margin allows?"
+                                        : "");
 }
 
 milliseconds OnTime(const LightBoard& board, const LitExposure& exposure,
@@ -116,10 +115,10 @@ milliseconds OnTime(const LightBoard& board, const LitExposure& exposure,
 
 // Step 1.
 Status TurnOnAlone(LightBoard& board, const LitExposure& exposure, const CaptureOptions& options) {
-  const Result<BoardState> state = exposure.light == nullptr
-                                       ? board.AllOff()
-                                       : board.SetLight(exposure.light->channel, exposure.level,
-                                                        OnTime(board, exposure, options));
+  const Result<BoardState> state = exposure.light
+                                       ? board.SetLight(exposure.light->channel, exposure.level,
+                                                        OnTime(board, exposure, options))
+                                       : board.AllOff();
   return state ? ConfirmLit(exposure.light, *state, "before the exposure")
                : tl::unexpected(state.error());
 }
@@ -134,7 +133,8 @@ Status ConfirmAndTurnOff(LightBoard& board, const LitExposure& exposure) {
     return confirmed;
   }
   const Result<BoardState> dark = board.AllOff();
-  return dark ? ConfirmLit(nullptr, *dark, "after the exposure") : tl::unexpected(dark.error());
+  return dark ? ConfirmLit(std::nullopt, *dark, "after the exposure")
+              : tl::unexpected(dark.error());
 }
 
 }  // namespace

@@ -2,7 +2,7 @@
 
 #include <chrono>
 #include <filesystem>
-#include <string>
+#include <optional>
 
 #include "core/error.h"
 #include "core/task.h"
@@ -13,11 +13,11 @@
 
 namespace sateen {
 
-// What is exposed.
+// One exposure under one light.
 struct LitExposure {
-  const Light* light = nullptr;  // null: the dark
-  double level = 1.0;
-  double exposure_s = 0.0;  // as the camera has it
+  std::optional<Light> light;  // absent: the dark
+  double level = 1.0;          // of the light, (0, 1]
+  double exposure_s = 0.0;     // as the camera has it
 };
 
 struct LitFrame {
@@ -25,17 +25,17 @@ struct LitFrame {
   std::chrono::duration<double> camera_time{};  // exposing and transferring
 };
 
-/// One exposure under one light:
+/// Exposes one frame under one light:
 ///
-///     1. the light goes on, for no longer than exposure and margin, and the board answers that it
-///        alone is on
-///     2. the camera exposes and delivers into `folder`; a thread keeps talking to the board, which
-///        turns everything off when it hears nothing for 2 s
-///     3. the board is asked again: a light that went off before the camera had delivered, or a board
-///        that has restarted, makes the frame worth nothing
-///     4. all off, and the board's word that it is so
+///     1. The light goes on, for no longer than exposure and margin, and the board confirms that it
+///        alone is on.
+///     2. The camera exposes and delivers into `folder`. A thread keeps talking to the board, which
+///        turns everything off when it hears nothing for 2 s.
+///     3. The board is asked again: the frame is worthless if the light went off before the camera had
+///        delivered, or if the board restarted.
+///     4. All lights go off, and the board confirms it.
 ///
-/// Connects the board where it is not. However it ends, all lights have been told to go off; a
+/// Connects the board where it is not. In every case all lights have been told to go off at the end; a
 /// cancelled task turns them off at once.
 ///
 /// Errors   kDevice, kTimeout: board or camera; kIo: the disk; kCancelled
@@ -43,7 +43,7 @@ struct LitFrame {
                                          const LitExposure& exposure, const CaptureOptions& options,
                                          const std::filesystem::path& folder, const Task& task);
 
-// Longest exposure for which the board lets a light be on, margin and all; s.
+// Returns the longest exposure for which the board lets a light be on, margin included. [s]
 [[nodiscard]] double LongestExposure(const BoardInfo& board, const Light& light,
                                      const CaptureOptions& options);
 

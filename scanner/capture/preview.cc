@@ -4,6 +4,7 @@
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <utility>
 
 #include "core/scratch_folder.h"
 #include "imaging/color.h"
@@ -11,7 +12,7 @@
 #include "imaging/raw.h"
 #include "rig/rig.h"
 #include "scanner/capture/exposure_search.h"
-#include "scanner/capture/lit_exposure.h"
+#include "scanner/capture/frame_taker.h"
 #include "scanner/sessions/files/folder_listing.h"
 #include "scanner/sessions/sensor_reading.h"
 
@@ -38,9 +39,9 @@ Result<std::optional<Light>> FindLight(const PreviewRequest& request,
   const char* end = request.light->data() + request.light->size();
   const auto [rest, error] = std::from_chars(request.light->data(), end, light.channel);
   if (error != std::errc() || rest != end || light.channel < 0) {
-    return Fail(ErrorCode::kBadData, "'{}' is no channel{}", *request.light,
+    return Fail(ErrorCode::kBadData, "'{}' is not a channel{}", *request.light,
                 rig ? fmt::format(", and {} has no light of that name", request.rig.string())
-                    : "; names of lights are looked up in a rig");
+                    : "; to use names of lights, give a rig");
   }
   return std::optional<Light>(std::move(light));
 }
@@ -98,31 +99,20 @@ struct Shot {
   SensorReading reading;
 };
 
-// One frame after another until the exposure is found, and that frame.
+// Takes one frame after another until the exposure is found, and returns that frame.
 class PreviewShooter {
  public:
-  PreviewShooter(const PreviewRequest& request, const Light* light,
-                 const std::optional<Response>& response, LightBoard& board, TetheredCamera& camera,
-                 const Task& task)
-      : request_(request),
-        light_(light),
-        response_(response),
-        board_(board),
-        camera_(camera),
-        task_(task) {}
+  PreviewShooter(std::optional<Light> light, std::optional<Response> response, FrameTaker& taker,
+                 const std::filesystem::path& folder)
+      : light_(std::move(light)), response_(std::move(response)), taker_(taker), folder_(folder) {}
 
-  Result<Shot> Take(double exposure_s, const std::filesystem::path& folder) {
-    const Result<ExposureSettings> set = camera_.Configure(
-        {.exposure_s = exposure_s, .f_number = request_.f_number, .iso = request_.iso});
-    const Result<LitFrame> lit =
-        set ? ExposeLit(board_, camera_, {light_, request_.level, set->exposure_s}, {}, folder,
-                        task_)
-            : tl::unexpected(set.error());
-    Result<RawMosaic> mosaic = lit ? ReadRawMosaic(lit->file.path) : tl::unexpected(lit.error());
+  Result<Shot> Take(double exposure_s) {
+    const Result<TakenFrame> taken = taker_.Take(light_, exposure_s, folder_ / "frame");
+    Result<RawMosaic> mosaic = taken ? ReadRawMosaic(taken->path) : tl::unexpected(taken.error());
     if (!mosaic) {
       return tl::unexpected(mosaic.error());
     }
-    FrameFile of{.path = lit->file.path, .response = response_};
+    FrameFile of{.path = taken->path, .response = response_};
     Result<SensorReading> reading = ReadingOf(of, *mosaic);
     if (!reading) {
       return tl::unexpected(reading.error());
@@ -130,37 +120,39 @@ class PreviewShooter {
     if (!response_) {
       reading->balance = mosaic->camera_white_balance;
     }
-    return Shot{*set, *std::move(mosaic), *reading};
+    return Shot{taken->settings, *std::move(mosaic), *reading};
   }
 
-  Result<Shot> Find(const std::filesystem::path& folder) {
-    const double longest_s = light_ != nullptr ? LongestExposure(board_.Info(), *light_, {}) : 10.0;
-    Result<ExposureSearch> search = ExposureSearch::Begin(
-        camera_.ExposureTimes(),
-        {.peak = kPreviewPeak, .low = 0.0, .most = 1, .longest_s = longest_s});
+  Result<Shot> Find() {
+    constexpr double kLongestOfRoomLight_s = 10.0;
+    const Result<double> longest_s =
+        light_ ? taker_.LongestExposureOf({*light_}) : kLongestOfRoomLight_s;
+    Result<ExposureSearch> search =
+        longest_s ? ExposureSearch::Begin(
+                        taker_.ExposureTimes(),
+                        {.peak = kPreviewPeak, .low = 0.0, .most = 1, .longest_s = *longest_s})
+                  : tl::unexpected(longest_s.error());
     for (int test = 0; search && test < kMostPreviewTests; ++test) {
       const double time_s = search->Found() ? search->Exposures()[0] : search->TestTime();
-      Result<Shot> shot = Take(time_s, folder);
+      Result<Shot> shot = Take(time_s);
       if (!shot || search->Found()) {
         return shot;
       }
-      // What cannot be exposed better is still worth a look.
+      // A scene that cannot be exposed better is still worth a look.
       if (!search->Take(LevelsOf(shot->mosaic, shot->reading))) {
         return shot;
       }
     }
-    return search ? Fail(ErrorCode::kDevice, "no exposure found in {} test frames; give one",
+    return search ? Fail(ErrorCode::kDevice, "no exposure found with {} test frames; give one",
                          kMostPreviewTests)
                   : Result<Shot>(tl::unexpected(search.error()));
   }
 
  private:
-  const PreviewRequest& request_;
-  const Light* light_;
-  const std::optional<Response>& response_;
-  LightBoard& board_;
-  TetheredCamera& camera_;
-  const Task& task_;
+  std::optional<Light> light_;
+  std::optional<Response> response_;
+  FrameTaker& taker_;
+  const std::filesystem::path& folder_;
 };
 
 // Nothing where the request names none.
@@ -212,10 +204,11 @@ Result<Preview> TakePreview(const PreviewRequest& request, RigDevices& devices, 
   if (!camera) {
     return tl::unexpected(camera.error());
   }
-  const std::optional<Response> response = rig ? rig->response : std::nullopt;
-  PreviewShooter shooter(request, *light ? &**light : nullptr, response, **board, **camera, task);
-  const Result<Shot> shot = request.exposure_s ? shooter.Take(*request.exposure_s, folder.Path())
-                                               : shooter.Find(folder.Path());
+  FrameTaker taker(**board, **camera,
+                   {.f_number = request.f_number, .iso = request.iso, .level = request.level}, {},
+                   task);
+  PreviewShooter shooter(*light, rig ? rig->response : std::nullopt, taker, folder.Path());
+  const Result<Shot> shot = request.exposure_s ? shooter.Take(*request.exposure_s) : shooter.Find();
   if (!shot) {
     devices.CloseCamera();
     return tl::unexpected(shot.error());

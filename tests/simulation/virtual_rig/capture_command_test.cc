@@ -92,7 +92,7 @@ TEST_F(CaptureCommand, GoesOnWhereItWasStopped) {
   EXPECT_THAT(log_.str(), HasSubstr("--resume " + dir_.string()));
   NewDevices();
   EXPECT_EQ(Run(), 2);
-  EXPECT_THAT(log_.str(), HasSubstr("go on with it: sateen capture --resume " + dir_.string()));
+  EXPECT_THAT(log_.str(), HasSubstr("continue it: sateen capture --resume " + dir_.string()));
   args_.resume = dir_;
   args_.exposure = "";
   ASSERT_EQ(Run(), 0) << log_.str();

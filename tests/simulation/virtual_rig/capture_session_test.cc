@@ -6,6 +6,7 @@
 #include <set>
 
 #include "core/file_io.h"
+#include "scanner/capture/session_proof.h"
 #include "scanner/sessions/dataset.h"
 #include "tests/scanner/sessions/dataset_files.h"
 #include "tests/simulation/virtual_rig/capture_fakes.h"
@@ -261,7 +262,7 @@ TEST_F(CaptureTest, ACameraThatFailsIsAskedAgainAndThenNamed) {
   const Error error = ErrorOf(Begin());
   EXPECT_EQ(error.code, ErrorCode::kDevice);
   EXPECT_EQ(error.message,
-            "frame 2 of 13 (led-0): camera is busy; tried 3 times; then go on: sateen capture "
+            "frame 2 of 13 (led-0): camera is busy; tried 3 times; then continue: sateen capture "
             "--resume " +
                 dir_.string());
   const Result<CaptureSummary> resumed = Resume();
@@ -282,7 +283,7 @@ TEST_F(CaptureTest, WithoutAFrameTheSameCommandDoes) {
 TEST_F(CaptureTest, AFullCardIsNotTriedAgain) {
   camera_.fail_next = {Fail(ErrorCode::kDevice, "card is full"), Status()};
   camera_.needs_a_person = true;
-  EXPECT_THAT(ErrorOf(Begin()), IsError(ErrorCode::kDevice, "card is full; then go on: "));
+  EXPECT_THAT(ErrorOf(Begin()), IsError(ErrorCode::kDevice, "card is full; then continue: "));
   EXPECT_EQ(camera_.captures, 2);
   EXPECT_EQ(camera_.opened, 0);
 }
@@ -291,7 +292,7 @@ TEST_F(CaptureTest, AFullDiskIsNotTriedAgain) {
   camera_.fail_next = {Fail(ErrorCode::kIo, "No space left on device; make room"), Status()};
   const Error error = ErrorOf(Begin());
   EXPECT_THAT(error, IsError(ErrorCode::kIo,
-                             "make room; then go on: sateen capture --resume " + dir_.string()));
+                             "make room; then continue: sateen capture --resume " + dir_.string()));
   EXPECT_EQ(camera_.captures, 2);
   const Result<CaptureSummary> resumed = Resume();
   ASSERT_TRUE(resumed) << resumed.error().message;
@@ -429,7 +430,7 @@ TEST_F(CaptureTest, ACompleteSessionThatLostAFrameSaysWhatToDo) {
   ASSERT_TRUE(session) << session.error().message;
   const Error error = ErrorOf(session->Finish());
   EXPECT_THAT(error.message, HasSubstr("04-led-3.dng"));
-  EXPECT_THAT(error.message, HasSubstr("restore the file, or capture anew"));
+  EXPECT_THAT(error.message, HasSubstr("restore the file, or capture again"));
 }
 
 TEST_F(CaptureTest, RefusesRigsAndOptionsThatCannotBe) {
@@ -471,7 +472,7 @@ TEST_F(CaptureTest, VerifyNamesEachDamage) {
   expect(replace("session.json", "\"iso\": 100.0", "\"iso\": 101.0"), "tells of other frames");
   expect(replace("journal.jsonl", "\"iso\":100.0}}", "\"iso\":101.0}}"), "tells of other frames");
   expect(replace("journal.jsonl", "{\"record\":\"complete\"}\n", ""),
-         "go on with it: sateen capture --resume");
+         "continue it: sateen capture --resume");
   expect([&] { fs::remove(dir_ / "journal.jsonl"); }, "journal.jsonl: is missing");
   // Captures of before did not name their journal.
   fs::remove_all(dir_);

@@ -1,0 +1,91 @@
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/error.h"
+#include "rig/rig.h"
+#include "scanner/capture/capture_options.h"
+#include "scanner/capture/frame_plan.h"
+#include "scanner/capture/journal.h"
+#include "scanner/sessions/read_plan.h"
+#include "scanner/sessions/session.h"
+
+namespace sateen {
+
+// Folder in a session that the camera delivers into, while it is captured.
+inline constexpr const char* kIncoming = ".sateen-incoming";
+
+/// The folder of one session while it is captured, and its journal. What has been recorded is on the
+/// disk when a function returns.
+///
+///     rig.json          the rig as it was, byte for byte
+///     journal.jsonl     what was done (scanner/capture/journal.h)
+///     .sateen-incoming/ where the camera delivers; whatever is left there is removed
+///     frames/           00-dark.dng, 01-led-0.dng ...: renamed from there when on the disk
+///     session.json      last, when every frame is there and checked
+///
+///     state      entered by                 legal
+///     begun      Begin(), Resume()          SetPlan()
+///     planned    SetPlan(), Resume()        SetPlan(), BeginFrame(), KeepFrame(), RejectFrame(),
+///                                           VerifyDone(); Complete() if all frames are done
+///     complete   Complete(), Resume()       VerifyDone(), Complete()
+///
+/// An error of the journal leaves the state as it was (JournalWriter).
+class SessionStore {
+ public:
+  /// Creates the folder and begins its journal. A journal without any frame is begun again. Errors as
+  /// CheckBegin(); kIo: another program has it locked.
+  [[nodiscard]] static Result<SessionStore> Begin(const std::filesystem::path& dir,
+                                                  const std::filesystem::path& rig_file,
+                                                  const CaptureOptions& options);
+  /// Continues the capture in `dir`. Errors as CheckResume(); kIo: another program has it locked.
+  [[nodiscard]] static Result<SessionStore> Resume(const std::filesystem::path& dir);
+
+  [[nodiscard]] const std::filesystem::path& Folder() const { return dir_; }
+  [[nodiscard]] std::filesystem::path Incoming() const { return dir_ / kIncoming; }
+  [[nodiscard]] const Rig& GetRig() const { return rig_; }
+  [[nodiscard]] const Journal& Record() const { return journal_; }
+  [[nodiscard]] FrameFile FileOf(const SessionFrame& frame) const;
+  // Returns the frames of the plan that are still to be taken, in order.
+  [[nodiscard]] std::vector<std::size_t> Open() const;
+  // Counts the done frames that were taken by this object, and its RejectFrame() calls.
+  [[nodiscard]] int Taken() const;
+  [[nodiscard]] int Rejected() const { return rejected_; }
+
+  // Records the plan; all its frames are open. A new exposure takes the place of the journal's.
+  [[nodiscard]] Status SetPlan(FramePlan plan, const std::string& reason,
+                               const PlannedExposure& exposure = {});
+  [[nodiscard]] Status BeginFrame(std::size_t frame) { return writer_.FrameBegun(frame); }
+  // Moves the delivered file to where the record says, and records the frame as done.
+  [[nodiscard]] Status KeepFrame(std::size_t frame, SessionFrame record,
+                                 const std::filesystem::path& delivered);
+  // Opens a frame that was begun or done again.
+  [[nodiscard]] Status RejectFrame(std::size_t frame, const std::string& reason);
+  // Rejects the done frames whose files have gone or changed. kIo, kBadData: the session is complete.
+  [[nodiscard]] Status VerifyDone();
+  // Removes frames of earlier plans, completes the journal and writes `session` to session.json.
+  [[nodiscard]] Status Complete(const Session& session);
+  [[nodiscard]] bool HasSessionJson() const;
+
+ private:
+  SessionStore(std::filesystem::path dir, Rig rig, Journal journal, JournalWriter writer);
+  [[nodiscard]] Status Place(const std::filesystem::path& delivered,
+                             const std::filesystem::path& place);
+  void RemoveOtherFrames() const;
+
+  std::filesystem::path dir_;
+  Rig rig_;
+  Journal journal_;
+  JournalWriter writer_;
+  std::vector<bool> is_new_;  // [frame of the plan]: done, and taken by this object
+  int rejected_ = 0;
+};
+
+// Returns the session of a journal whose frames are all done.
+[[nodiscard]] Session SessionOf(const Journal& journal);
+
+}  // namespace sateen
