@@ -9,28 +9,28 @@
 
 namespace sateen {
 
-// How a session is captured. What decides about its frames is in the journal, and kept on resuming.
+// Options of a capture. Those that decide about its frames are in the journal and kept on resuming.
 struct CaptureOptions {
   SessionKind kind = SessionKind::kFabric;
-  // Of every frame, (0, 60] s. Absent: found by test frames (scanner/capture/exposure_search.h).
+  // Exposure time of every frame, (0, 60] s. Absent: found by test frames (ExposureSearch).
   std::optional<double> exposure_s;
   double f_number = 8.0;
   double iso = 100.0;
-  // Exposures a light, at most, where they are found: 1 to 3. A sheet always has one.
+  // Largest number of exposures per light where they are found: 1 to 3. A sheet always has one.
   int brackets = 3;
-  // Of each light, (0, 1].
+  // Level of each light, (0, 1].
   double level = 1.0;
-  // From a light's going on to the exposure; 0 to 1.5 s: then the board must hear something.
+  // Time from turning a light on to the exposure; 0 to 1.5 s: then the board must hear something.
   std::chrono::milliseconds settle{30};
-  // How much longer than the exposure a light may stay on: until the camera has delivered. 1 ms to
-  // 60 s; no longer than the board allows a light.
+  // Time beyond the exposure that a light may stay on, until the camera has delivered. 1 ms to 60 s; no
+  // longer than the board allows.
   std::chrono::milliseconds margin{6000};
   // Longest wait for a frame beyond its exposure; at least 1 ms.
   std::chrono::milliseconds deadline{30'000};
-  // How often the board is spoken to while the camera exposes, so that it keeps the light on, in a
-  // thread of its own; less than its 2 s of silence. 0: never, for a board in simulated time.
+  // Interval of talking to the board while the camera exposes, in a thread of its own, so that it keeps
+  // the light on; less than its 2 s of silence. 0: never, for a board in simulated time.
   std::chrono::milliseconds keep_alive{400};
-  // How often a frame is taken in all before its failure ends the capture; at least 1.
+  // Number of times that a frame is tried before its failure ends the capture; at least 1.
   int tries = 3;
   FrameCheckOptions checks;
 

@@ -21,9 +21,4 @@ void CaptureProgress::Tell(const SessionStore& store, const char* stage, const s
   observer_(event);
 }
 
-double CaptureProgress::Seconds() const {
-  const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - started_;
-  return spent.count();
-}
-
 }  // namespace sateen

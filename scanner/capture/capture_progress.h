@@ -1,11 +1,12 @@
 #pragma once
 
-#include <chrono>
 #include <cstddef>
 #include <functional>
 #include <optional>
 #include <string>
+#include <utility>
 
+#include "core/stopwatch.h"
 #include "scanner/capture/session_store.h"
 
 namespace sateen {
@@ -29,7 +30,7 @@ class CaptureProgress {
  public:
   void SetObserver(CaptureObserver observer) { observer_ = std::move(observer); }
   void SetPeak(double peak) { peak_ = peak; }
-  void AddCameraTime(std::chrono::duration<double> time) { camera_time_ += time; }
+  void AddCameraTime(double seconds) { camera_s_ += seconds; }
   // Counts a frame that was kept, also if it is rejected later: the time left is estimated from these.
   void AddFrame() { ++frames_; }
 
@@ -37,13 +38,13 @@ class CaptureProgress {
   void Tell(const SessionStore& store, const char* stage, const std::string& light = "",
             double exposure_s = 0.0) const;
 
-  [[nodiscard]] double Seconds() const;
-  [[nodiscard]] double CameraSeconds() const { return camera_time_.count(); }
+  [[nodiscard]] double Seconds() const { return started_.Seconds(); }
+  [[nodiscard]] double CameraSeconds() const { return camera_s_; }
 
  private:
   CaptureObserver observer_;
-  std::chrono::steady_clock::time_point started_ = std::chrono::steady_clock::now();
-  std::chrono::duration<double> camera_time_{};
+  Stopwatch started_;
+  double camera_s_ = 0.0;
   double peak_ = 0.0;
   int frames_ = 0;
 };

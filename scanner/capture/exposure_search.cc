@@ -34,8 +34,8 @@ Result<ExposureSearch> ExposureSearch::Begin(std::vector<double> times_s,
                                              const ExposureGoal& goal) {
   if (times_s.empty()) {
     return Fail(ErrorCode::kInvalidArgument,
-                "the camera does not say which exposure times it has, so none can be found; give "
-                "one, as --exposure 1/50");
+                "the camera does not list its exposure times, so none can be found; give one, as "
+                "--exposure 1/50");
   }
   return ExposureSearch(std::move(times_s), goal);
 }
@@ -76,7 +76,7 @@ Status ExposureSearch::Take(const SignalLevels& levels) {
   }
   if (levels.peak < kNothing) {
     return Fail(ErrorCode::kBadData,
-                "nothing to see even at {:.4g} s, the longest exposure possible: is the lens cap "
+                "the picture is black even at the longest exposure of {:.4g} s: is the lens cap "
                 "off, do the lights have power, is the fabric in the picture?",
                 tested);
   }

@@ -56,7 +56,7 @@ Result<TakenFrame> FrameTaker::Take(const std::optional<Light>& light, double ex
   return ExposeLit(board_, camera_, {light, settings_.level, set->exposure_s}, options_, folder,
                    task_)
       .map([&](const LitFrame& shot) {
-        return TakenFrame{shot.file.path, *set, shot.camera_time};
+        return TakenFrame{shot.file.path, *set, shot.camera_s};
       });
 }
 

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <chrono>
 #include <filesystem>
 #include <optional>
 #include <vector>
@@ -25,8 +24,8 @@ struct FrameSettings {
 // A frame as the camera delivered it.
 struct TakenFrame {
   std::filesystem::path path;
-  ExposureSettings settings;                    // as the camera had them
-  std::chrono::duration<double> camera_time{};  // exposing and transferring
+  ExposureSettings settings;  // as the camera had them
+  double camera_s = 0.0;      // time of exposing and transferring
 };
 
 // Returns whether another try may succeed after an error of a frame or of its check.

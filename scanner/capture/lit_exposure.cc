@@ -6,6 +6,8 @@
 #include <mutex>
 #include <thread>
 
+#include "core/stopwatch.h"
+
 namespace sateen {
 namespace {
 
@@ -157,9 +159,9 @@ Result<LitFrame> ExposeLit(LightBoard& board, TetheredCamera& camera, const LitE
   board.Wait(options.settle);
   KeepAlive keep_alive(board, options.keep_alive, task);
   const milliseconds shutter(static_cast<int>(std::ceil(1000.0 * exposure.exposure_s)));
-  const auto begin = std::chrono::steady_clock::now();
+  const Stopwatch stopwatch;
   Result<CapturedFile> file = camera.Capture(folder, shutter + options.deadline);
-  const std::chrono::duration<double> camera_time = std::chrono::steady_clock::now() - begin;
+  const double camera_s = stopwatch.Seconds();
   const Status kept = keep_alive.Stop();
   if (task.Cancelled()) {
     return Fail(ErrorCode::kCancelled, "cancelled while the camera exposed; the lights are off");
@@ -168,7 +170,7 @@ Result<LitFrame> ExposeLit(LightBoard& board, TetheredCamera& camera, const LitE
     return tl::unexpected(file.error());
   }
   const Status confirmed = kept.and_then([&] { return ConfirmAndTurnOff(board, exposure); });
-  return confirmed.map([&] { return LitFrame{*std::move(file), camera_time}; });
+  return confirmed.map([&] { return LitFrame{*std::move(file), camera_s}; });
 }
 
 double LongestExposure(const BoardInfo& board, const Light& light, const CaptureOptions& options) {

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <chrono>
 #include <filesystem>
 #include <optional>
 
@@ -22,7 +21,7 @@ struct LitExposure {
 
 struct LitFrame {
   CapturedFile file;
-  std::chrono::duration<double> camera_time{};  // exposing and transferring
+  double camera_s = 0.0;  // time of exposing and transferring
 };
 
 /// Exposes one frame under one light:

@@ -31,7 +31,7 @@ Result<ArrivedFrame> PlanTaker::Take(std::size_t frame, int attempt) {
   if (!taken) {
     return tl::unexpected(taken.error());
   }
-  progress_.AddCameraTime(taken->camera_time);
+  progress_.AddCameraTime(taken->camera_s);
   SessionFrame record = planned;
   record.exposure_s = taken->settings.exposure_s;
   record.f_number = taken->settings.f_number;

@@ -29,7 +29,7 @@ struct PreviewRequest {
 
 // kInvalidArgument: the name does not end in .jpg or .jpeg, which is what is written.
 [[nodiscard]] Status CheckPreviewName(const std::filesystem::path& output);
-// What it would be refused for before a device is opened: options, rig, light.
+// Fails if the request would be refused before a device is opened: for its options, rig or light.
 [[nodiscard]] Status CheckPreview(const PreviewRequest& request);
 
 struct Preview {
@@ -39,11 +39,11 @@ struct Preview {
   SignalLevels levels;
 };
 
-/// One frame to look at: framing, focus, exposure. White balance is the rig's, or else the camera's
-/// own; brightness is as exposed, what saturates is white's level. Nothing is kept.
+/// Takes one frame to look at: framing, focus, exposure. White balance is the rig's, or else the
+/// camera's own. Brightness is as exposed: saturation is shown as white. Nothing is kept.
 ///
 /// Errors   kInvalidArgument: options; kBadData: the rig has no such light; kDevice, kTimeout, kIo
-/// However it ends, all lights are off.
+/// In every case all lights are off at the end.
 [[nodiscard]] Result<Preview> TakePreview(const PreviewRequest& request, RigDevices& devices,
                                           const Task& task);
 

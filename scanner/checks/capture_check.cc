@@ -5,6 +5,7 @@
 #include <numeric>
 #include <optional>
 
+#include "core/statistics.h"
 #include "rig/projection.h"
 #include "scanner/checks/frame_compare.h"
 #include "scanner/checks/light_patterns.h"
@@ -30,12 +31,6 @@ double Sum(const BlockField& field) { return std::accumulate(field.begin(), fiel
 BlockField Less(BlockField field, const BlockField& other) {
   std::ranges::transform(field, other, field.begin(), std::minus<>());
   return field;
-}
-
-double Median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 class CaptureChecker {

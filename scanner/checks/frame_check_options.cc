@@ -1,5 +1,9 @@
 #include "scanner/checks/frame_check_options.h"
 
+#include <fmt/format.h>
+
+#include "core/option_range.h"
+
 namespace sateen {
 
 Status FrameCheckOptions::Validate() const {
@@ -17,8 +21,7 @@ Status FrameCheckOptions::Validate() const {
         Range{"max_shift_px", max_shift_px, 100.0}, Range{"min_shift_peak", min_shift_peak, 1.0},
         Range{"min_shade", min_shade, 1.0}, Range{"max_exposure_error", max_exposure_error, 1.0}}) {
     if (!(value > 0.0 && value <= most)) {
-      return Fail(ErrorCode::kInvalidArgument, "{} is {}; need more than 0 and at most {:g}", name,
-                  value, most);
+      return OutOfRange(name, value, fmt::format("more than 0 and at most {:g}", most));
     }
   }
   return {};

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/statistics.h"
+
 namespace sateen {
 
 void TakeOutGloss(const std::vector<Eigen::Vector2d>& l, std::vector<Shift>& shifts) {
@@ -25,12 +27,11 @@ void TakeOutGloss(const std::vector<Eigen::Vector2d>& l, std::vector<Shift>& shi
     }
     b = dl * ll.inverse();
   }
-  const auto middle = left.begin() + static_cast<std::ptrdiff_t>(left.size() / 2);
-  std::nth_element(left.begin(), middle, left.end());
+  const double typical = Median(left);
   for (size_t k = 1; k < count; ++k) {
     shifts[k].px -= b * l[k];
     // The last frame has the first light again, so that gloss does not move it.
-    shifts[k].sd_px = std::hypot(shifts[k].sd_px, k + 1 < count ? *middle : 0.0);  // (2)
+    shifts[k].sd_px = std::hypot(shifts[k].sd_px, k + 1 < count ? typical : 0.0);  // (2)
   }
 }
 

@@ -5,6 +5,9 @@
 #include <functional>
 #include <utility>
 
+#include "core/statistics.h"
+#include "rig/projection.h"
+
 namespace sateen {
 namespace {
 
@@ -18,9 +21,7 @@ BlockField MedianLog(const std::vector<BlockField>& all, const std::vector<bool>
         logs.push_back(std::log(std::max(all[k][b], 1e-30)));
       }
     }
-    const auto middle = logs.begin() + static_cast<std::ptrdiff_t>(logs.size() / 2);
-    std::nth_element(logs.begin(), middle, logs.end());
-    median.push_back(logs.empty() ? 0.0 : *middle);
+    median.push_back(logs.empty() ? 0.0 : Median(std::move(logs)));
   }
   return median;
 }

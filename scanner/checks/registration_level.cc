@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "core/linear_algebra.h"
+#include "core/statistics.h"
 #include "scanner/checks/registration_images.h"
 
 namespace sateen {
@@ -227,9 +228,7 @@ double RegistrationLevel::MisfitScale() {
   if (all.empty()) {
     return 1.0;
   }
-  const auto middle = all.begin() + static_cast<std::ptrdiff_t>(all.size() / 2);
-  std::nth_element(all.begin(), middle, all.end());
-  return std::max(2.0 * *middle, 1e-9);
+  return std::max(2.0 * Median(std::move(all)), 1e-9);
 }
 
 }  // namespace sateen

@@ -6,8 +6,10 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <utility>
 
 #include "core/linear_algebra.h"
+#include "core/statistics.h"
 
 namespace sateen {
 namespace {
@@ -23,15 +25,10 @@ constexpr Eigen::Index kTerms = 9;    // of f: a cubic without its constant
 
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
-double Quantile(std::vector<double> values, double share) {
+// Quantile of the known values; unknown where there is none.
+double KnownQuantile(std::vector<double> values, double share) {
   std::erase_if(values, [](double v) { return !std::isfinite(v); });
-  if (values.empty()) {
-    return kUnknown;
-  }
-  const auto at =
-      values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), at, values.end());
-  return *at;
+  return values.empty() ? kUnknown : Quantile(std::move(values), share);
 }
 
 Eigen::Matrix<double, kTerms, 1> CubicOf(const Eigen::Vector2d& h) {
@@ -79,7 +76,7 @@ class ShadeFinder {
       depths.push_back(DepthOf(y_[k]));
       strength.push_back(StrengthOf(depths[k]));
     }
-    const double least = std::max(-std::log1p(-min_depth_), kAbove * Quantile(strength, 0.5));
+    const double least = std::max(-std::log1p(-min_depth_), kAbove * KnownQuantile(strength, 0.5));
     std::vector<std::optional<Shade>> shades(count_);
     for (size_t k = 0; k < count_; ++k) {
       if (strength[k] > least) {
@@ -97,7 +94,7 @@ class ShadeFinder {
         Predict(b);
       }
       for (size_t k = 0; k < count_; ++k) {
-        const double level = Quantile(y_[k], 0.5);
+        const double level = KnownQuantile(y_[k], 0.5);
         if (!std::isfinite(level)) {
           return false;
         }
@@ -213,7 +210,7 @@ class ShadeFinder {
       z[b] -= PlaceOf(b).homogeneous().dot(plane);
     }
     z = Smoothed(z);
-    const double top = Quantile(z, 0.75);
+    const double top = KnownQuantile(z, 0.75);
     std::ranges::transform(z, z.begin(), [&](double value) { return top - value; });
     return z;
   }
@@ -230,7 +227,7 @@ class ShadeFinder {
             near.push_back(z[At(u, v)]);
           }
         }
-        smooth[At(x, y)] = Quantile(near, 0.5);
+        smooth[At(x, y)] = KnownQuantile(near, 0.5);
       }
     }
     return smooth;
@@ -301,7 +298,7 @@ class ShadeFinder {
     }
     shade.share = static_cast<double>(depths.size()) / static_cast<double>(blocks_);
     shade.middle /= static_cast<double>(depths.size());
-    shade.depth = 1.0 - std::exp(-Quantile(depths, 0.5));
+    shade.depth = 1.0 - std::exp(-KnownQuantile(depths, 0.5));
     return shade;
   }
 

@@ -57,11 +57,11 @@ bool HasInterface(const fs::path& device, std::string_view kind) {
 std::string Obstacle(const fs::path& device, const fs::path& node, bool held) {
   const std::string vendor = FirstLine(device / "idVendor");
   if (!HasInterface(device, kStillImage)) {
-    return "it shows itself as a disk: set its USB mode to PTP or MTP (on some cameras PC Remote)";
+    return "it is connected as a disk: set its USB mode to PTP or MTP (on some cameras PC Remote)";
   }
   if (access(node.c_str(), R_OK | W_OK) != 0) {
     return fmt::format(
-        "{} may not be opened by you: put SUBSYSTEM==\"usb\", ATTR{{idVendor}}==\"{}\", "
+        "you have no permission to open {}: put SUBSYSTEM==\"usb\", ATTR{{idVendor}}==\"{}\", "
         "MODE=\"0660\", TAG+=\"uaccess\" into /etc/udev/rules.d/70-sateen-camera.rules, then plug "
         "it in again",
         node.string(), vendor);
@@ -85,7 +85,7 @@ Result<std::unique_ptr<TetheredCamera>> MakeTetheredCamera(const std::string& na
     return std::make_unique<PtpCamera>(PtpCameraOptions{.port = name, .decode = decode});
   }
   return Fail(ErrorCode::kInvalidArgument,
-              "'{}' is no camera; need usb:BUS,DEVICE or ptpip:ADDRESS, as sateen devices lists "
+              "'{}' is not a camera; need usb:BUS,DEVICE or ptpip:ADDRESS, as sateen devices lists "
               "them, or folder:DIR",
               name);
 }

@@ -20,7 +20,7 @@ namespace sateen {
 struct UsbCamera {
   std::string port;  // libgphoto2's name: "usb:001,004"
   std::string description;
-  // Why it cannot be used as it is, and how to mend it; empty: nothing is known against it.
+  // Reason why it cannot be used as it is, and how to fix it; empty: none is known.
   std::string obstacle;
 };
 

@@ -99,10 +99,11 @@ Result<CapturedFile> FolderCamera::Capture(const fs::path& folder, milliseconds 
       continue;
     }
     if (files->size() > 1) {
-      return Fail(ErrorCode::kDevice,
-                  "{}: {} and {} came for one frame, and which is its is not known; see that the "
-                  "camera takes one frame at a time, and take it again",
-                  options_.folder.string(), files->begin()->first, files->rbegin()->first);
+      return Fail(
+          ErrorCode::kDevice,
+          "{}: {} and {} arrived for one frame, and it is not known which is right; see that the "
+          "camera takes one frame at a time, and take it again",
+          options_.folder.string(), files->begin()->first, files->rbegin()->first);
     }
     const std::pair<std::string, uint64_t> now = *files->begin();
     unchanged = now == last ? unchanged + options_.interval : milliseconds(0);
@@ -127,7 +128,7 @@ Result<CapturedFile> FolderCamera::Capture(const fs::path& folder, milliseconds 
               options_.folder.string(), deadline.count(),
               left_alone_.empty() ? "" : ", and those from before are left alone: ",
               fmt::join(left_alone_, ", "),
-              "see that the camera was released and that its program drops RAW files there");
+              "check that the camera was released and that its program saves RAW files there");
 }
 
 Result<CapturedFile> FolderCamera::Take(const std::string& name, uint64_t bytes,

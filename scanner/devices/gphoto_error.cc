@@ -26,7 +26,7 @@ Error OfDisk(int error_number, const std::string& path) {
   const std::string folder = std::filesystem::path(path).parent_path().string();
   return {ErrorCode::kIo,
           fmt::format("{}: cannot write: {}; {}", path, SystemReason(error_number),
-                      full ? "make room" : fmt::format("see that {} can be written to", folder))};
+                      full ? "make room" : fmt::format("check that {} can be written to", folder))};
 }
 
 }  // namespace
@@ -42,13 +42,13 @@ Error FromLibrary(const json& error, const std::string& port) {
   }
   const int code = error.value("code", 0);
   const std::string text = error.value("text", "");
-  std::string remedy = "; see that it is on and connected";
+  std::string remedy = "; check that it is on and connected";
   if (code == kIoInProgress) {
     remedy = "; it is busy: wait, or switch it off and on";
   } else if (code == kIoUsbClaim) {
     remedy = "; another program holds it: sateen devices says which";
   } else if (code == kModelNotFound) {
-    remedy = "; no camera is there: sateen devices lists them";
+    remedy = "; there is no camera: sateen devices lists them";
   } else if (CardIsFull(error)) {
     return {
         ErrorCode::kDevice,

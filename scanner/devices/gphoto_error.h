@@ -14,7 +14,7 @@ namespace sateen {
 // Also where it may be gone: a connection that broke is kUnspecified as often as not.
 [[nodiscard]] bool ConnectionIsGone(const nlohmann::json& error);
 
-// The memory card has no room, which no further try mends.
+// Returns whether the memory card is full, which only a person can fix.
 [[nodiscard]] bool CardIsFull(const nlohmann::json& error);
 
 }  // namespace sateen

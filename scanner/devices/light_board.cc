@@ -22,7 +22,7 @@ std::string ResetText(unsigned causes) {
   }
   SATEEN_RESET_CAUSES(SATEEN_RESET_TEXT)
 #undef SATEEN_RESET_TEXT
-  return text.empty() ? "unknown: the bootloader does not tell" : text;
+  return text.empty() ? "unknown: the bootloader does not say" : text;
 }
 
 // Of a SateenState, or of a SateenReport, which begins with the same fields.
@@ -230,8 +230,8 @@ Result<BoardState> LightBoard::Arm(int channel, double level, milliseconds on_ti
     valid = CheckLight(channel, level, on_time, info_);
   }
   if (valid && level == 0.0) {
-    valid = Fail(ErrorCode::kInvalidArgument,
-                 "light {}: a flash of level 0 is none; needs 0.001 to 1", channel);
+    valid =
+        Fail(ErrorCode::kInvalidArgument, "light {}: a flash needs a level of 0.001 to 1", channel);
   }
   if (!valid) {
     return tl::unexpected(valid.error());

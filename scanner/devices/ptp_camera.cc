@@ -93,9 +93,10 @@ Result<CameraInfo> PtpCamera::Connect() {
       return tl::unexpected(found.error());
     }
     if (found->size() != 1) {
-      return Fail(ErrorCode::kDevice,
-                  "{} cameras found, need one; sateen devices lists them and says what is missing",
-                  found->size());
+      return Fail(
+          ErrorCode::kDevice,
+          "found {} cameras but one is needed; sateen devices lists them and says what is missing",
+          found->size());
     }
     port = found->front().port;
   }
@@ -158,7 +159,7 @@ Result<json> PtpCamera::Ask(const json& request, milliseconds longest) {
                     ? fmt::format(" ({} ms, '{}'); it may be asleep: wake it, and switch off its "
                                   "automatic power-off",
                                   longest.count(), request.value("do", ""))
-                    : "; connect anew");
+                    : "; connect again");
   }
   if (answer->contains("error")) {
     card_is_full_ = CardIsFull((*answer)["error"]);
@@ -336,10 +337,11 @@ Result<PtpCamera::FileOnCamera> PtpCamera::Expose(const Deadline& deadline) {
   // Its file may still come, and must not be taken for a later frame.
   worker_->Kill();
   state_ = State::kLost;
-  return Fail(ErrorCode::kTimeout,
-              "{} at {}: the shutter was released and no file came in time; connect anew and take "
-              "the frame again",
-              info_.model, info_.port);
+  return Fail(
+      ErrorCode::kTimeout,
+      "{} at {}: the shutter was released but no file arrived in time; connect again and take "
+      "the frame again",
+      info_.model, info_.port);
 }
 
 Result<CapturedFile> PtpCamera::Capture(const fs::path& folder, milliseconds longest) {
@@ -365,16 +367,17 @@ Result<CapturedFile> PtpCamera::Capture(const fs::path& folder, milliseconds lon
   if (!second) {
     return tl::unexpected(second.error());
   }
-  return Fail(ErrorCode::kDevice,
-              "{} at {}: two files, {} and {}, came for one frame, and which is its is not known; "
-              "set RAW alone and single shots, and take the frame again",
-              info_.model, info_.port, file->name, second->value("name", ""));
+  return Fail(
+      ErrorCode::kDevice,
+      "{} at {}: two files, {} and {}, arrived for one frame, and it is not known which is right; "
+      "set RAW alone and single shots, and take the frame again",
+      info_.model, info_.port, file->name, second->value("name", ""));
 }
 
 Result<CapturedFile> PtpCamera::Fetch(const FileOnCamera& file, const fs::path& folder,
                                       const Deadline& deadline) {
   if (!IsRawName(file.name)) {
-    return Fail(ErrorCode::kDevice, "{} at {}: {} is no RAW file; set the image quality to RAW",
+    return Fail(ErrorCode::kDevice, "{} at {}: {} is not a RAW file; set the image quality to RAW",
                 info_.model, info_.port, file.name);
   }
   const fs::path part = folder / fmt::format(".{}.part", file.name);
@@ -419,7 +422,7 @@ Status PtpCamera::Download(const FileOnCamera& file, const fs::path& path,
   }
   const uint64_t bytes = fs::file_size(path, failed);
   if (const uint64_t needed = info->value("bytes", bytes); failed || bytes != needed) {
-    return Fail(ErrorCode::kBadData, "{} at {}: of {} came {} of {} bytes; take the frame again",
+    return Fail(ErrorCode::kBadData, "{} at {}: {}: {} of {} bytes arrived; take the frame again",
                 info_.model, info_.port, file.name, failed ? 0 : bytes, needed);
   }
   return options_.decode

@@ -34,7 +34,7 @@ class RigDevices {
   [[nodiscard]] Result<LightBoard*> Board();
   // Whether a board has ever answered: then a light of it may be on.
   [[nodiscard]] bool BoardHasAnswered() const { return board_has_answered_; }
-  // Open; what was lost is opened anew. kDevice: none, or it cannot be used, and how to mend it.
+  // Open; what was lost is opened anew. kDevice: none, or it cannot be used, and how to fix it.
   [[nodiscard]] Result<TetheredCamera*> Camera();
   // So that Camera() opens it anew: after an error that may have been its own.
   void CloseCamera() noexcept;

@@ -36,14 +36,14 @@ class TetheredCamera {
   virtual ~TetheredCamera() = default;
 
   // Finds the camera, connects, and checks what a capture needs: RAW files, manual exposure and, where
-  // the camera says it, manual focus. kDevice: which of them is missing, and how to mend it.
+  // the camera says it, manual focus. kDevice: which of them is missing, and how to fix it.
   [[nodiscard]] virtual Result<CameraInfo> Open() = 0;
 
   // Sets what differs from what the camera has, reads everything back and returns that.
   // kInvalidArgument: a value that cannot be set; the message names its two settable neighbours.
   [[nodiscard]] virtual Result<ExposureSettings> Configure(const ExposureSettings& settings) = 0;
 
-  // The exposure times that may be set, s, ascending; empty where the camera does not say.
+  // Returns the exposure times that may be set, ascending; empty where the camera does not say. [s]
   [[nodiscard]] virtual std::vector<double> ExposureTimes() const = 0;
 
   // Takes one frame. It is downloaded to a new file in `folder`, its size is checked, and it is deleted
@@ -53,7 +53,7 @@ class TetheredCamera {
   [[nodiscard]] virtual Result<CapturedFile> Capture(const std::filesystem::path& folder,
                                                      std::chrono::milliseconds deadline) = 0;
 
-  // Whether the latest Capture() failed by what no further try mends, but a person: a full card.
+  // Returns whether the latest Capture() failed for a reason that only a person can fix: a full card.
   [[nodiscard]] virtual bool NeedsAPerson() const { return false; }
 
   virtual void Close() noexcept = 0;

@@ -4,8 +4,10 @@
 #include <cmath>
 #include <iterator>
 #include <optional>
+#include <utility>
 
 #include "core/sha256.h"
+#include "core/statistics.h"
 #include "imaging/color.h"
 #include "imaging/image_io.h"
 #include "imaging/raw.h"
@@ -112,11 +114,7 @@ float WhiteLevel(const Image<float>& linear) {
   if (values.empty()) {
     return 0.0F;
   }
-  const auto place =
-      values.begin() +
-      static_cast<std::ptrdiff_t>(kWhitePercentile * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), place, values.end());
-  return *place;
+  return Quantile(std::move(values), kWhitePercentile);
 }
 
 Image<uint8_t> BytesOf(const Image<float>& levels) {
@@ -135,7 +133,7 @@ Result<BoardFolder> ListBoardPhotos(const fs::path& path) {
   BoardFolder folder;
   std::error_code error;
   if (!fs::exists(path, error)) {
-    return Fail(ErrorCode::kIo, "{}: is not there; need photographs of a board", path.string());
+    return Fail(ErrorCode::kIo, "{}: does not exist; need photographs of a board", path.string());
   }
   if (!fs::is_directory(path, error)) {
     folder.photos.push_back({path.filename().string(), {FrameFile{path, 1.0, std::nullopt}}});
@@ -161,7 +159,7 @@ Result<BoardFolder> ListBoardPhotos(const fs::path& path) {
       if (IsPicture(name)) {
         folder.photos.push_back({name, {FrameFile{path / name, 1.0, std::nullopt}}});
       } else {
-        folder.ignored.push_back(name + ": no photograph");
+        folder.ignored.push_back(name + ": not a photograph");
       }
     } else if (!Exists(path / name / "session.json")) {
       folder.ignored.push_back(name + ": a folder without session.json");

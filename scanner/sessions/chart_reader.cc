@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "core/parallel.h"
+#include "core/statistics.h"
 #include "imaging/raw.h"
 #include "scanner/sessions/dataset.h"
 #include "scanner/sessions/files/patch_places.h"
@@ -36,8 +37,8 @@ Result<std::vector<ChartFile>> FilesOf(const fs::path& dir, const ReadPlan& plan
     if (!IsRawName(file.file.path)) {
       return Fail(
           ErrorCode::kBadData,
-          "{}: is no camera RAW file; a sensor's response is measured from its own readings, "
-          "which no developed file has",
+          "{}: is not a camera RAW file; a sensor's response is measured from its raw readings, "
+          "which developed files do not have",
           path);
     }
     if (!frame.exposure_s) {
@@ -56,7 +57,7 @@ Result<std::vector<ChartFile>> FilesOf(const fs::path& dir, const ReadPlan& plan
       const Lights& lights = plan.rig.lights;
       const auto light = std::ranges::find(lights, frame.light, &Light::name);
       if (light == lights.end()) {
-        return Fail(ErrorCode::kBadData, "{}: is of light '{}', which the rig has not", path,
+        return Fail(ErrorCode::kBadData, "{}: is of light '{}', which is not in the rig", path,
                     frame.light);
       }
       file.light = static_cast<size_t>(light - lights.begin());
@@ -81,15 +82,8 @@ Image<float> CellsOf(const RawMosaic& mosaic) {
   return cells;
 }
 
-// The level that a small share of the picture is above.
-float BrightLevel(const Image<float>& cells) {
-  std::vector<float> sorted = cells.pixels;
-  const auto place =
-      sorted.begin() +
-      static_cast<std::ptrdiff_t>((1.0 - kBrightShare) * static_cast<double>(sorted.size() - 1));
-  std::nth_element(sorted.begin(), place, sorted.end());
-  return *place;
-}
+// Returns the level that a small share of the picture is above.
+float BrightLevel(const Image<float>& cells) { return Quantile(cells.pixels, 1.0 - kBrightShare); }
 
 class ChartReader {
  public:
@@ -109,8 +103,8 @@ class ChartReader {
     if (!plan->rig.camera) {
       return Fail(
           ErrorCode::kBadData,
-          "{}: the rig has no camera; calibrate lens and pose first, so that patches have a "
-          "place in the picture",
+          "{}: the rig has no camera; calibrate lens and pose first, so that the patches can be "
+          "found in the picture",
           dir_.string());
     }
     Result<std::vector<ChartFile>> files = FilesOf(dir_, *plan);
@@ -187,7 +181,7 @@ class ChartReader {
         return Fail(
             ErrorCode::kBadData,
             "{}: the middle of patch '{}' has {} sites; need at least {}: use larger patches "
-            "or a camera that sees more",
+            "or a camera of higher resolution",
             files_[frame].file.path.string(), patch.name, places_.back().index.size(),
             kFewestPatchSites);
       }

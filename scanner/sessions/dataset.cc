@@ -21,12 +21,12 @@ Status CheckKind(const fs::path& path) {
   std::error_code error;
   const fs::file_status status = fs::status(path, error);
   if (!fs::exists(status)) {
-    return Fail(ErrorCode::kIo, "{}: {}; need a capture: a folder, or an .lp file", path.string(),
+    return Fail(ErrorCode::kIo, "{}: {}; need a folder or an .lp file", path.string(),
                 error.message());
   }
   if (!fs::is_directory(status) && LowerCase(path.extension().string()) != ".lp") {
     return Fail(ErrorCode::kBadData,
-                "{}: is neither a folder nor an .lp file; give the folder of the capture",
+                "{}: is neither a folder nor an .lp file; give the folder of the session",
                 path.string());
   }
   return {};
@@ -83,8 +83,8 @@ Status ReplaceRig(const fs::path& rig_file, ReadPlan& plan) {
   }
   if (rig->lights.size() != plan.lit.size()) {
     return Fail(ErrorCode::kBadData,
-                "{}: has {} lights but the capture has {} frames; need as many", rig_file.string(),
-                rig->lights.size(), plan.lit.size());
+                "{}: has {} lights but there are {} frames; need one light per frame",
+                rig_file.string(), rig->lights.size(), plan.lit.size());
   }
   plan.sha256_of_input[rig_file.string()] = *hash;
   plan.rig = *std::move(rig);
@@ -134,12 +134,12 @@ Status SelectLights(const std::vector<int>& wanted, ReadPlan& plan) {
   std::set<int> seen;
   for (const int k : wanted) {
     if (k < 0 || k >= count) {
-      return Fail(ErrorCode::kInvalidArgument, "light {} does not exist; the capture has 0 to {}",
-                  k, count - 1);
+      return Fail(ErrorCode::kInvalidArgument, "light {} does not exist; there are 0 to {}", k,
+                  count - 1);
     }
     if (!seen.insert(k).second) {
       return Fail(ErrorCode::kInvalidArgument,
-                  "light {} is asked for twice; name each of 0 to {} once at most", k, count - 1);
+                  "light {} is named twice; name each of 0 to {} at most once", k, count - 1);
     }
     lights.push_back(plan.rig.lights[static_cast<size_t>(k)]);
     lit.push_back(plan.lit[static_cast<size_t>(k)]);
@@ -180,7 +180,7 @@ Status ReadMaskInto(const ReadPlan& plan, Dataset& dataset) {
   }
   if (Status status = CheckSize(name, mask->Size(), dataset.Size()); !status) {
     if (plan.mask_is_shared) {
-      dataset.warnings.push_back("the mask was left out: " + status.error().message);
+      dataset.warnings.push_back("the mask is not used: " + status.error().message);
       return {};
     }
     return status;
@@ -246,7 +246,7 @@ Status ReadFrames(const ReadPlan& plan, const ReadDatasetOptions& options, const
     }
     if (!noise) {
       // No frame that is solved depends on it.
-      dataset.warnings.push_back("the noise is not measured on the repeat: " +
+      dataset.warnings.push_back("the noise cannot be measured from the repeat: " +
                                  noise.error().message);
       noise = std::nullopt;
     }

@@ -76,7 +76,7 @@ Result<std::string> CheckedHash(const FrameFile& file) {
   if (hash && file.sha256 && *file.sha256 != *hash) {
     return Fail(ErrorCode::kBadData,
                 "{}: its SHA-256 is {} but the session recorded {}: the file has changed since the "
-                "capture; restore it or capture anew",
+                "capture; restore it or capture again",
                 file.path.string(), *hash, *file.sha256);
   }
   return hash;

@@ -52,7 +52,7 @@ Result<NumberRow> ReadLine(const TextLine& line, const fs::path& lp_file, ReadPl
 
 Status CheckCount(const std::vector<TextLine>& lines, const fs::path& lp_file) {
   if (lines.empty()) {
-    return Fail(ErrorCode::kBadData, "{}: the file is empty; need the count of lights",
+    return Fail(ErrorCode::kBadData, "{}: the file is empty; need the number of lights",
                 lp_file.string());
   }
   const std::string place = PlaceOf(lp_file, lines[0].number);
@@ -61,13 +61,14 @@ Status CheckCount(const std::vector<TextLine>& lines, const fs::path& lp_file) {
     return tl::unexpected(count.error());
   }
   if (count->values.size() != 1) {
-    return Fail(ErrorCode::kBadData, "{}: found {} numbers; need one, the count of lights", place,
+    return Fail(ErrorCode::kBadData, "{}: found {} numbers; need one, the number of lights", place,
                 count->values.size());
   }
   const size_t found = lines.size() - 1;
   if (found == 0 || count->values[0] != static_cast<double>(found)) {
-    return Fail(ErrorCode::kBadData, "{}: the count is {} but {} lights follow; need as many",
-                place, count->values[0], found);
+    return Fail(ErrorCode::kBadData,
+                "{}: the number of lights is {} but {} follow; correct one of them", place,
+                count->values[0], found);
   }
   return {};
 }
@@ -82,7 +83,7 @@ void WarnOfPositions(const std::vector<NumberRow>& rows, ReadPlan& plan) {
   if (count > 0) {
     plan.warnings.push_back(fmt::format(
         "{} of {} lights are given by a position, not by a unit vector; their distance, in an "
-        "unknown unit, was left out and they are taken as distant lights",
+        "unknown unit, is ignored and they are treated as distant lights",
         count, rows.size()));
   }
 }

@@ -54,7 +54,7 @@ class FileStore final : public MosaicStore {
     std::string name = (dir / ".sateen-mosaics-XXXXXX").string();
     const int fd = mkostemp(name.data(), O_CLOEXEC);
     if (fd < 0) {
-      return Fail(ErrorCode::kIo, "{}: no scratch file can be made here: {}", dir.string(),
+      return Fail(ErrorCode::kIo, "{}: a scratch file cannot be created here: {}", dir.string(),
                   std::generic_category().message(errno));
     }
     unlink(name.c_str());

@@ -15,24 +15,24 @@
 
 namespace sateen {
 
-// Readings of a capture. The stack keeps them in memory or in a file without a name that goes with it.
+// Readings of a dataset. The stack keeps them in memory, or in an unnamed file that is deleted with it.
 struct LoadedMosaics {
   MosaicStack stack;
   std::map<std::string, std::string> sha256_of_input;
   std::optional<SensorNoise> noise;  // nothing: not known, or not asked for
 };
 
-// Why the frames of a capture cannot be solved from their mosaics; nothing where they can be.
+// Returns why the frames cannot be solved from their mosaics; nothing where they can be.
 [[nodiscard]] std::optional<std::string> WhyNoMosaics(const ReadPlan& plan);
 
-// How much of it lies in memory.
+// Limits of memory, in bytes.
 struct MosaicMemory {
   std::uintmax_t readings = std::uintmax_t{256} << 20;  // beyond, they go to a file
   std::uintmax_t decoded = std::uintmax_t{640} << 20;   // at the same time, but one frame at least
 };
 
-/// Decodes the frames of a capture whose WhyNoMosaics() is nothing; `noise` is that of all of them. Where the readings are more than
-/// memory.readings they go to a scratch file in `scratch_dir`, row by row as the decoder has them.
+/// Decodes the frames of a plan whose WhyNoMosaics() is nothing; `noise` is the same for all. Readings
+/// beyond memory.readings go to a scratch file in `scratch_dir`, row by row as they are decoded.
 ///
 /// Errors  as LoadFrames(); kIo where the scratch file cannot be written, with the room it needs
 [[nodiscard]] Result<LoadedMosaics> LoadMosaics(const ReadPlan& plan,

@@ -13,28 +13,28 @@
 
 namespace sateen {
 
-// One exposure to be read.
+// File of one exposure to be read.
 struct FrameFile {
   std::filesystem::path path;
   // The file's value divided by this is radiance: exposure_s (iso / 100) / f_number^2.
   double exposure = 1.0;
-  std::optional<std::string> sha256;  // what the session recorded
-  // Of the rig that the frame is read for: how its readings become balanced radiance.
+  std::optional<std::string> sha256;  // as the session recorded it
+  // Response of the rig's sensor, by which readings become balanced radiance.
   std::optional<Response> response = std::nullopt;
-  // How its picture lies against that of the first light's frame: what is at x there is at x + shift.
+  // Shift of its picture from the first light's frame: a point at x there is at x + shift_px here.
   Eigen::Vector2d shift_px = Eigen::Vector2d::Zero();
 };
 
-// The lit frames of one light: one, or several of different exposures, the longest first.
+// Lit frames of one light: one, or several with different exposures, the longest first.
 using LightFiles = std::vector<FrameFile>;
 
-// A light's frame, and the same once more at the end of a capture.
+// A light's frame, and its repeat at the end of a capture.
 struct RepeatedLight {
   FrameFile first;
   FrameFile again;
 };
 
-// What a layout says about a dataset, before any pixel is read.
+// Files and facts of a dataset, as its layout gives them, before any pixel is read.
 struct ReadPlan {
   std::string layout;
   Rig rig;
@@ -42,7 +42,7 @@ struct ReadPlan {
   std::vector<FrameFile> dark;
   std::optional<RepeatedLight> repeated;  // with one exposure
   std::optional<std::filesystem::path> mask;
-  bool mask_is_shared = false;  // it lies one folder up: left out where its size does not fit
+  bool mask_is_shared = false;  // from one folder up: not used where its size differs
   std::optional<TruthFiles> truth;
   std::optional<Session> session;
   std::vector<std::string> warnings;

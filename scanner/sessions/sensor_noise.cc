@@ -7,8 +7,10 @@
 #include <limits>
 #include <optional>
 #include <span>
+#include <utility>
 
 #include "calibration/response/photon_transfer.h"
+#include "core/statistics.h"
 #include "imaging/raw.h"
 #include "scanner/sessions/frame_loader.h"
 
@@ -115,7 +117,7 @@ void AddGroups(std::vector<TileNoise> tiles, size_t colour, bool is_dark,
   }
 }
 
-// Without the lit groups that hold far more than the noise of most: there the cloth or a shadow moved.
+// Erases lit groups with far more noise than most: there the cloth or a shadow moved.
 void LeaveOutWhatMoved(std::vector<TransferPoint>& points) {
   double least = std::numeric_limits<double>::infinity();
   for (const TransferPoint& point : points) {
@@ -130,11 +132,9 @@ void LeaveOutWhatMoved(std::vector<TransferPoint>& points) {
   if (gains.empty()) {
     return;
   }
-  const auto middle = gains.begin() + static_cast<std::ptrdiff_t>(gains.size() / 2);
-  std::ranges::nth_element(gains, middle);
+  const double gain = Median(std::move(gains));
   std::erase_if(points, [&](const TransferPoint& point) {
-    return !point.is_dark &&
-           point.variance_dn2 > kMovedVariance * (*middle * point.mean_dn + least);
+    return !point.is_dark && point.variance_dn2 > kMovedVariance * (gain * point.mean_dn + least);
   });
 }
 

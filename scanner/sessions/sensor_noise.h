@@ -18,7 +18,7 @@ struct SensorNoise {
   std::map<std::string, std::string> sha256_of_input = {};  // of the repeat
 };
 
-/// The noise of a capture's readings: what the rig's response says of it; without, measured on a light's
+/// Finds the noise of a dataset's readings: that of the rig's response; without one, measured on a light's
 /// frame a, its repeat b and the first and last dark frame, tile by tile of 32 x 16 sites:
 ///
 ///     variance = 1/2 var(a - b - beta (a + b)),  beta by least squares in the tile            (1)

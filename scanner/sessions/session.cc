@@ -25,7 +25,7 @@ Status CheckFactors(const std::vector<SessionFrame>& frames, const std::string& 
       if ((frames[i].*factor).has_value() != (frames[0].*factor).has_value()) {
         const bool has = (frames[i].*factor).has_value();
         return Fail(ErrorCode::kBadData,
-                    "{}: frames[{}] has {} but frames[{}] has not; give it for every frame or "
+                    "{}: frames[{}] has {} but frames[{}] does not; give it for every frame or "
                     "for none",
                     where, has ? i : 0, key, has ? 0 : i);
       }
@@ -40,7 +40,7 @@ Status CheckFileThere(const fs::path& dir) {
   }
   return Fail(ErrorCode::kBadData,
               "{}: found journal.jsonl but no session.json: the capture was not completed; "
-              "go on with it: sateen capture --resume {}",
+              "continue it: sateen capture --resume {}",
               dir.string(), dir.string());
 }
 

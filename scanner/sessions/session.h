@@ -12,7 +12,7 @@
 namespace sateen {
 
 enum class SessionKind { kFabric, kSheet, kChart, kBoard };
-// kRepeat: a light again, at the end, to see what drifted meanwhile. It is no part of the stack.
+// kRepeat: a light again, at the end, to measure drift. It is not part of the stack.
 enum class FrameRole { kLit, kDark, kRepeat };
 
 [[nodiscard]] std::string_view Name(SessionKind kind);
@@ -24,21 +24,21 @@ struct SessionFrame {
   std::string light;  // name of the rig's light; empty for a dark frame
   std::string file;   // relative to the session's folder
   std::optional<std::string> sha256;
-  // As far as they are known; a factor is known for every frame or for none.
+  // Absent where not known; each is known for every frame or for none.
   std::optional<double> exposure_s;
   std::optional<double> f_number;
   std::optional<double> iso;
-  // How its picture lies against the first lit frame's, where camera or fabric have moved a little:
-  // what is at x there is at x + shift_px. [px right, px down]
+  // Shift of its picture from the first lit frame's, where camera or fabric moved a little: a point at
+  // x there is at x + shift_px here. [px right, px down]
   std::optional<Eigen::Vector2d> shift_px;
 
-  /// The value of a file divided by H is radiance:
+  /// Returns H, by which a file's value is divided to give radiance:
   ///
-  ///     H = exposure_s (iso / 100) / f_number^2,        a factor that is not known is 1     (1)
+  ///     H = exposure_s (iso / 100) / f_number^2,        an unknown factor is 1     (1)
   [[nodiscard]] double Exposure() const;
 };
 
-/// One capture on disk: its frames and their record, session.json. A plain value.
+/// Record of one session on disk, session.json. A plain value.
 ///
 ///     {"schema": "sateen.session/1",
 ///      "kind": "fabric",                    fabric, sheet, chart or board
@@ -55,7 +55,7 @@ struct SessionFrame {
 ///         "shift_px": [0.31, -0.12]}],      optional: right, down; at most 100 each
 ///      "table_from_sheet": [16 numbers],    optional: rigid, row-major, millimetres
 ///      "mask": "mask.png",                  optional: relative to the session's folder
-///      "journal": "journal.jsonl"}          of a capture: what proves it, beside this file
+///      "journal": "journal.jsonl"}          optional: the capture's journal, beside this file
 struct Session {
   SessionKind kind = SessionKind::kFabric;
   std::string rig;
@@ -63,7 +63,7 @@ struct Session {
   std::vector<SessionFrame> frames;
   std::optional<Eigen::Isometry3d> table_from_sheet;
   std::optional<std::string> mask;
-  bool has_journal = false;  // a capture made it, with a journal
+  bool has_journal = false;  // written by a capture
 };
 
 /// Reads session.json in `dir`.
@@ -73,10 +73,10 @@ struct Session {
 ///          is there, so the capture was not completed
 [[nodiscard]] Result<Session> ReadSessionRecord(const std::filesystem::path& dir);
 
-// The same without its repeats, which are no part of what is solved.
+// Reads session.json without its repeats, which are not solved.
 [[nodiscard]] Result<Session> ReadSession(const std::filesystem::path& dir);
 
-// The text of session.json; ReadSessionRecord gives the same value back.
+// Returns the text of session.json, from which ReadSessionRecord() gives the same value back.
 [[nodiscard]] std::string SessionToJson(const Session& session);
 
 }  // namespace sateen

@@ -70,7 +70,7 @@ std::optional<std::string> ReadHash(JsonReader& json, std::string_view key) {
   std::optional<std::string> hash = json.OptionalString(key);
   const bool is_hash = !hash || (hash->size() == 64 &&
                                  hash->find_first_not_of("0123456789abcdef") == std::string::npos);
-  json.Require(is_hash, key, "is no SHA-256; need 64 lower-case hexadecimal digits");
+  json.Require(is_hash, key, "is not a SHA-256; need 64 lower-case hexadecimal digits");
   return hash;
 }
 

@@ -24,7 +24,7 @@ Status ReadRigInto(const fs::path& path, const std::optional<std::string>& recor
   if (recorded_sha256 && *recorded_sha256 != *hash) {
     return Fail(ErrorCode::kBadData,
                 "{}: its SHA-256 is {} but the session recorded {}: the rig has changed since the "
-                "capture; restore it, or give the one to use with --rig",
+                "capture; restore it, or give the rig to use with --rig",
                 path.string(), *hash, *recorded_sha256);
   }
   Result<Rig> rig = ReadRig(path);
@@ -114,9 +114,10 @@ Status AssignFrames(const fs::path& dir, ReadPlan& plan) {
                                     [&](const Light& l) { return l.name == frame.light; });
     if (light == lights.end()) {
       return Fail(ErrorCode::kBadData,
-                  "{}: frame {} is of light '{}', which the rig has not; its lights are {}", where,
-                  frame.file, frame.light,
-                  lights.empty() ? "none: give it rough positions by the ruler" : NamesOf(lights));
+                  "{}: frame {} is of light '{}', which is not in the rig; its lights are {}",
+                  where, frame.file, frame.light,
+                  lights.empty() ? "none: give it rough positions, measured with a ruler"
+                                 : NamesOf(lights));
     }
     LightFiles& files = plan.lit[static_cast<size_t>(light - lights.begin())];
     if (Status status = AddToLight(file, frame, *plan.session, where, dir, files); !status) {

@@ -8,12 +8,12 @@
 
 namespace sateen {
 
-// A folder with session.json. The rig is options.rig_file, else the one that the session names;
-// frames are matched to its lights by name.
+// Plans a folder with session.json. The rig is options.rig_file, else the one that the session names.
+// Frames are matched to its lights by name.
 [[nodiscard]] Result<ReadPlan> PlanSession(const std::filesystem::path& dir,
                                            const ReadDatasetOptions& options);
 
-// The record and the rig of it alone, no frames: for sessions that may have several of a light.
+// Reads record and rig alone, without frames: for sessions that may have several frames per light.
 [[nodiscard]] Result<ReadPlan> PlanSessionRig(const std::filesystem::path& dir,
                                               const ReadDatasetOptions& options);
 

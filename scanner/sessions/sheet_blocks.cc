@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
+
+#include "core/statistics.h"
 
 #include "rig/projection.h"
 
@@ -27,9 +30,7 @@ Eigen::Array3d NoisePerRadiance(const BlockMeans& means) {
       }
     }
     if (!ratios.empty()) {
-      const auto middle = ratios.begin() + static_cast<std::ptrdiff_t>(ratios.size() / 2);
-      std::nth_element(ratios.begin(), middle, ratios.end());
-      noise[c] = std::max(*middle, kSmallestVariance);
+      noise[c] = std::max(Median(std::move(ratios)), kSmallestVariance);
     }
   }
   return noise;

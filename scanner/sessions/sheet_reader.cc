@@ -108,7 +108,7 @@ Status FindPose(const std::filesystem::path& dir, const ReadPlan& plan,
   if (2 * pose->markers_used < pose->markers) {
     sheet.warnings.push_back(
         fmt::format("{}: {} of {} markers of the border are seen whole; show more of the paper's "
-                    "rim for a surer pose",
+                    "border for a more certain pose",
                     dir.string(), pose->markers_used, pose->markers));
   }
   sheet.table_from_sheet = pose->table_from_sheet;

@@ -57,7 +57,7 @@ Status CheckMatWhole(const fs::path& path) {
   const std::string_view magic = std::string_view(*bytes).substr(0, 128);
   if (!magic.starts_with("MATLAB 5.0") || !magic.ends_with("IM")) {
     return Fail(ErrorCode::kBadData,
-                "{}: is no little-endian MATLAB 5 file; need one, as `save -v7` writes it",
+                "{}: is not a little-endian MATLAB 5 file; need one, as `save -v7` writes it",
                 path.string());
   }
   size_t end = magic.size();

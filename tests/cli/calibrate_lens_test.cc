@@ -248,7 +248,7 @@ TEST_F(CalibrateLensCommand, NamesWhatItCannotUse) {
   const RunResult run =
       CalibrateLens({mixed.string(), "--board", kBoard, "-o", Path("mixed.json"), "--json"});
   ASSERT_EQ(run.exit_status, 0) << run.log;
-  EXPECT_THAT(run.log, HasSubstr("ignored: notes.txt: no photograph"));
+  EXPECT_THAT(run.log, HasSubstr("ignored: notes.txt: not a photograph"));
   EXPECT_THAT(run.log, HasSubstr("blank.png is not used: 0 markers of DICT_4X4_50 found"));
   EXPECT_THAT(run.log, HasSubstr("small.png is not used: is 320 x 240 px, and most are 640 x 480"));
   EXPECT_THAT(run.log, HasSubstr("broken.jpg is not used: "));

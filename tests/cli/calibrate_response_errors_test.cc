@@ -93,7 +93,7 @@ TEST_F(CalibrateResponseErrors, BadSessionsAreNamedWithTheirFault) {
                        session["frames"][1]["file"] = "overview.png";
                        session["frames"][1].erase("sha256");
                      }),
-              "overview.png: is no camera RAW file");
+              "overview.png: is not a camera RAW file");
   ExpectError(Spoilt("iso", [](nlohmann::json& session) { session["frames"][2]["iso"] = 200; }),
               "has another f_number or iso than frames/led-0-0.00125s-1.dng");
   Render("white", "chart", R"("albedo": [0.9, 0.9, 0.9])", kSeries, kSensor);

@@ -77,7 +77,7 @@ TEST(Devices, CamerasAreListedWithWhatIsMissing) {
   EXPECT_EQ(json["devices"][2]["profile"], "folder");
   const RunResult wrong = Devices(fake, kPorts, {"--camera", "dslr"});
   EXPECT_EQ(wrong.exit_status, 0);
-  EXPECT_THAT(wrong.out, HasSubstr("'dslr' is no camera"));
+  EXPECT_THAT(wrong.out, HasSubstr("'dslr' is not a camera"));
   EXPECT_THAT(Devices(fake, kPorts).out, HasSubstr("no camera"));
   const auto with_obstacle = [&](const cli::DevicesArgs& args, const Task& task, std::ostream& out,
                                  std::ostream& log) {

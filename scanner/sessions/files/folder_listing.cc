@@ -146,7 +146,7 @@ std::string DescribeFolder(const fs::path& dir) {
   std::string list;
   for (const auto& [ending, count] : endings) {
     list += fmt::format("{}{} {}", list.empty() ? " (" : ", ", count,
-                        ending.empty() ? "without ending" : ending);
+                        ending.empty() ? "without extension" : ending);
   }
   return fmt::format("{}{}{}{}", Plural(files, "file"), list, list.empty() ? "" : ")",
                      folders == 0 ? "" : ", " + Plural(folders, "folder"));

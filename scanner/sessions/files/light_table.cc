@@ -42,8 +42,9 @@ Status TakeCount(std::vector<NumberRow>& rows) {
   rows.erase(rows.begin());
   const size_t found = IsByColumns(rows) ? rows[0].values.size() : rows.size();
   if (first.values[0] != static_cast<double>(found)) {
-    return Fail(ErrorCode::kBadData, "{}: the count is {} but {} lights follow; need as many",
-                first.place, first.values[0], found);
+    return Fail(ErrorCode::kBadData,
+                "{}: the number of lights is {} but {} follow; correct one of them", first.place,
+                first.values[0], found);
   }
   return {};
 }

@@ -20,7 +20,8 @@ std::optional<Eigen::Isometry3d> ReadTransform(JsonReader& json, std::string_vie
       (rotation * rotation.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff() <=
           kRigidTolerance &&
       rotation.determinant() > 0.0 && matrix.row(3) == Eigen::RowVector4d(0, 0, 0, 1);
-  json.Require(is_rigid, key, "is no rigid motion; need a rotation, a shift and 0 0 0 1, by rows");
+  json.Require(is_rigid, key,
+               "is not a rigid motion; need a rotation, a translation and 0 0 0 1, by rows");
   return Eigen::Isometry3d(matrix);
 }
 

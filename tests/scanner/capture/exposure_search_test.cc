@@ -97,7 +97,7 @@ TEST(ExposureSearch, EndsBetweenTimesThatAreFarApart) {
 
 TEST(ExposureSearch, SaysWhatCannotBeExposed) {
   EXPECT_THAT(Search(1e6, 0.5).error(), IsError(ErrorCode::kBadData, "too bright"));
-  EXPECT_THAT(Search(1e-5, 0.5).error(), IsError(ErrorCode::kBadData, "nothing to see"));
+  EXPECT_THAT(Search(1e-5, 0.5).error(), IsError(ErrorCode::kBadData, "the picture is black"));
   EXPECT_THAT(ExposureSearch::Begin({}, {}).error(),
               IsError(ErrorCode::kInvalidArgument, "--exposure"));
 }

@@ -189,7 +189,7 @@ TEST(Journal, NamesTheLineOfWhatDoesNotParse) {
   expect(replace(1, "as asked", ""), "line 2: reason is empty");
   expect(replace(1, "0.1}]", "0}]"), "exposure_s is 0");
   expect([](auto& l) { l.erase(l.begin() + 1); }, "line 2: frame is 0; the plan has 0 frames");
-  expect(replace(0, "\"rig_sha256\":\"a", "\"rig_sha256\":\"g"), "rig_sha256 is no SHA-256");
+  expect(replace(0, "\"rig_sha256\":\"a", "\"rig_sha256\":\"g"), "rig_sha256 is not a SHA-256");
   expect(replace(2, "\"frame\":0", "\"frame\":3"),
          "line 3: frame is 3; the plan has 3 frames, from 0");
   expect(replace(2, "\"frame\":0", "\"frame\":-1"), "line 3: frame is -1");

@@ -156,7 +156,7 @@ TEST(FrameCheckOptions, NamesWhatIsOutOfRange) {
   EXPECT_TRUE(options.Validate());
   options.max_shift_px = 0.0;
   EXPECT_THAT(options.Validate().error(),
-              testing::IsError(ErrorCode::kInvalidArgument, "max_shift_px is 0"));
+              testing::IsError(ErrorCode::kInvalidArgument, "max_shift_px = 0"));
 }
 
 }  // namespace

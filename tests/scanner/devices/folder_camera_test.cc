@@ -111,7 +111,7 @@ TEST_F(FolderCameraTest, TwoFilesForOneFrameAreRefused) {
   at_look_[2] = [&] { Drop("b.dng"); };
   const Result<CapturedFile> frame = Capture();
   ASSERT_FALSE(frame);
-  EXPECT_THAT(frame.error().message, HasSubstr("a.dng and b.dng came for one frame"));
+  EXPECT_THAT(frame.error().message, HasSubstr("a.dng and b.dng arrived for one frame"));
 }
 
 TEST_F(FolderCameraTest, AnotherExposureThanSetIsRefused) {

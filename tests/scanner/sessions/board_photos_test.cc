@@ -38,7 +38,7 @@ TEST(ListBoardPhotos, TakesPhotographsAndSessionsInNaturalOrder) {
   const BoardFolder found = ListBoardPhotos(folder.Path()).value();
   EXPECT_THAT(NamesOf(found.photos), ElementsAre("p2.PNG", "p3.dng", "p9", "p10.jpg"));
   EXPECT_THAT(found.ignored,
-              ElementsAre("notes.txt: no photograph", "other: a folder without session.json",
+              ElementsAre("notes.txt: not a photograph", "other: a folder without session.json",
                           HasSubstr("is a session of kind 'sheet'; need a board")));
   EXPECT_EQ(found.photos[2].files.size(), 2U);  // without the dark frame
   EXPECT_EQ(found.sha256_of_input.size(), 1U);

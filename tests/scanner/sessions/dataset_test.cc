@@ -62,13 +62,12 @@ TEST_F(StackReader, DoesNotReadFramesOfOtherLights) {
 }
 
 TEST_F(StackReader, RefusesLightsThatDoNotExistOrTwice) {
-  EXPECT_THAT(
-      FailureOf(dir_, {.lights = {0, 4}}),
-      IsError(ErrorCode::kInvalidArgument, "light 4 does not exist; the capture has 0 to 3"));
+  EXPECT_THAT(FailureOf(dir_, {.lights = {0, 4}}),
+              IsError(ErrorCode::kInvalidArgument, "light 4 does not exist; there are 0 to 3"));
   EXPECT_THAT(FailureOf(dir_, {.lights = {-1}}),
               IsError(ErrorCode::kInvalidArgument, "light -1 does not exist"));
   EXPECT_THAT(FailureOf(dir_, {.lights = {2, 2}}),
-              IsError(ErrorCode::kInvalidArgument, "light 2 is asked for twice"));
+              IsError(ErrorCode::kInvalidArgument, "light 2 is named twice"));
 }
 
 TEST_F(StackReader, NamesTheFrameOfAnotherSize) {
@@ -112,7 +111,7 @@ TEST_F(StackReader, TakesTheRigThatTheCallerNames) {
   rig.lights.pop_back();
   WriteText(temp_.Path() / "rig.json", RigToJson(rig));
   EXPECT_THAT(FailureOf(dir_, {.rig_file = temp_.Path() / "rig.json"}),
-              IsError(ErrorCode::kBadData, "has 3 lights but the capture has 4 frames"));
+              IsError(ErrorCode::kBadData, "has 3 lights but there are 4 frames"));
 }
 
 TEST_F(StackReader, RefusesTruthThatDoesNotFit) {
@@ -187,7 +186,7 @@ TEST_F(StackReader, StopsWhenCancelled) {
 
 TEST_F(StackReader, SaysWhatItFoundWhereThereIsNoCapture) {
   EXPECT_THAT(FailureOf(temp_.Path() / "gone"),
-              IsError(ErrorCode::kIo, "gone: No such file or directory; need a capture"));
+              IsError(ErrorCode::kIo, "gone: No such file or directory; need a folder"));
   EXPECT_THAT(FailureOf(temp_.Path() / "gone.lp"), IsError(ErrorCode::kIo, "gone.lp"));
   EXPECT_THAT(FailureOf(dir_ / "im.8.exr"),
               IsError(ErrorCode::kBadData, "is neither a folder nor an .lp file"));

@@ -79,7 +79,7 @@ TEST(DescribeFolder, CountsFilesByTheirEnding) {
   for (const char* name : {"a.png", "b.PNG", "c.txt", "README", "raw/d.nef"}) {
     WriteText(temp.Path() / name, "");
   }
-  EXPECT_EQ(DescribeFolder(temp.Path()), "4 files (1 without ending, 2 .png, 1 .txt), 1 folder");
+  EXPECT_EQ(DescribeFolder(temp.Path()), "4 files (1 without extension, 2 .png, 1 .txt), 1 folder");
 }
 
 }  // namespace

@@ -89,12 +89,12 @@ TEST(Lp, TakesTheMaskBesideIt) {
 
 TEST(Lp, RefusesEachLineThatIsWrong) {
   EXPECT_THAT(FailureOfLp(""), IsError(ErrorCode::kBadData, "the file is empty"));
-  EXPECT_THAT(FailureOfLp("0\n"), IsError(ErrorCode::kBadData, "the count is 0"));
+  EXPECT_THAT(FailureOfLp("0\n"), IsError(ErrorCode::kBadData, "the number of lights is 0"));
   EXPECT_THAT(FailureOfLp("a.exr 0.6 0 0.8\n"),
               IsError(ErrorCode::kBadData, "dome.lp:1: found 'a.exr'"));
   EXPECT_THAT(FailureOfLp("3 3\n"), IsError(ErrorCode::kBadData, "dome.lp:1: found 2 numbers"));
   EXPECT_THAT(FailureOfLp("3\na.exr 0.6 0 0.8\n"),
-              IsError(ErrorCode::kBadData, "dome.lp:1: the count is 3 but 1 lights follow"));
+              IsError(ErrorCode::kBadData, "dome.lp:1: the number of lights is 3 but 1 follow"));
   EXPECT_THAT(FailureOfLp("1\na.exr 0.6 0.8\n"),
               IsError(ErrorCode::kBadData, "dome.lp:2: found 3 words"));
   EXPECT_THAT(FailureOfLp("1\na.exr 0.6 O 0.8\n"),

@@ -145,7 +145,7 @@ TEST(LightsFolder, RefusesDirectionsThatAreNone) {
 TEST(LightsFolder, RefusesTablesOfAnotherShape) {
   EXPECT_THAT(FailureOfLights(""), IsError(ErrorCode::kBadData, "holds no lights"));
   EXPECT_THAT(FailureOfLights("5\n" + Lines(testing::kDirections)),
-              IsError(ErrorCode::kBadData, "lights.txt:1: the count is 5 but 4 lights follow"));
+              IsError(ErrorCode::kBadData, "lights.txt:1: the number of lights is 5 but 4 follow"));
   EXPECT_THAT(FailureOfLights("1 2 3 4\n"),
               IsError(ErrorCode::kBadData, "lights.txt:1: found 4 numbers"));
   EXPECT_THAT(FailureOfLights(".6 0 .8\n-.6 0\n0 .6 .8\n0 -.6 .8\n"),
@@ -213,7 +213,7 @@ TEST(LightsFolder, LeavesOutASharedMaskThatDoesNotFit) {
   const Dataset dataset = MustRead(temp.Path() / "cat");
   EXPECT_FALSE(dataset.mask);
   ASSERT_THAT(dataset.warnings, SizeIs(1));
-  EXPECT_THAT(dataset.warnings[0], HasSubstr("the mask was left out"));
+  EXPECT_THAT(dataset.warnings[0], HasSubstr("the mask is not used"));
 }
 
 }  // namespace

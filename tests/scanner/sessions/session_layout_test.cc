@@ -263,9 +263,10 @@ TEST_F(SessionLayout, RefusesALightThatTheRigHasNot) {
   Session session = FourLightSession();
   session.frames[2].light = "up";
   Write(session);
-  EXPECT_THAT(FailureOf(dir_), IsError(ErrorCode::kBadData,
-                                       "of light 'up', which the rig has not; its lights are east, "
-                                       "west, north, south"));
+  EXPECT_THAT(FailureOf(dir_),
+              IsError(ErrorCode::kBadData,
+                      "of light 'up', which is not in the rig; its lights are east, "
+                      "west, north, south"));
 }
 
 TEST_F(SessionLayout, MatchesAnotherRigByTheNamesOfItsLights) {

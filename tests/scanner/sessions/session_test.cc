@@ -113,14 +113,14 @@ TEST(Session, RefusesEachKeyThatIsWrong) {
          "kind is \"wool\"; need one of fabric, sheet, chart, board");
   expect([](Json& j) { j.erase("rig"); }, "rig is missing");
   expect([](Json& j) { j["rig"] = ""; }, "rig is empty");
-  expect([](Json& j) { j["rig_sha256"] = "ABC"; }, "rig_sha256 is no SHA-256");
+  expect([](Json& j) { j["rig_sha256"] = "ABC"; }, "rig_sha256 is not a SHA-256");
   expect([](Json& j) { j["frames"] = Json::array(); }, "frames is empty");
   expect([](Json& j) { j["colour"] = 1; }, "colour is not known");
   expect([](Json& j) { j["schema"] = "sateen.session/2"; }, "sateen.session/2");
-  expect([](Json& j) { j["table_from_sheet"][0] = 2; }, "table_from_sheet is no rigid motion");
-  expect([](Json& j) { j["table_from_sheet"][15] = 2; }, "table_from_sheet is no rigid motion");
+  expect([](Json& j) { j["table_from_sheet"][0] = 2; }, "table_from_sheet is not a rigid motion");
+  expect([](Json& j) { j["table_from_sheet"][15] = 2; }, "table_from_sheet is not a rigid motion");
   expect([](Json& j) { j["table_from_sheet"] = {-1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}; },
-         "table_from_sheet is no rigid motion");  // a mirror
+         "table_from_sheet is not a rigid motion");  // a mirror
 }
 
 TEST(Session, RefusesEachKeyOfAFrameThatIsWrong) {
@@ -134,7 +134,7 @@ TEST(Session, RefusesEachKeyOfAFrameThatIsWrong) {
   expect([](Json& f) { f["role"] = "dark"; }, "light is not known");  // a dark frame has no light
   expect([](Json& f) { f["role"] = "repeat", f.erase("light"); }, "light is missing");
   expect([](Json& f) { f["file"] = ""; }, "file is empty");
-  expect([](Json& f) { f["sha256"] = std::string(64, 'g'); }, "sha256 is no SHA-256");
+  expect([](Json& f) { f["sha256"] = std::string(64, 'g'); }, "sha256 is not a SHA-256");
   expect([](Json& f) { f["exposure_s"] = 0; }, "exposure_s is 0; need more than 0");
   expect([](Json& f) { f["f_number"] = -2; }, "f_number is -2; need more than 0");
   expect([](Json& f) { f["iso"] = 1e9; }, "iso is 1000000000");

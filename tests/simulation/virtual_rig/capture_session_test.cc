@@ -441,7 +441,7 @@ TEST_F(CaptureTest, RefusesRigsAndOptionsThatCannotBe) {
   WriteText(rig_file_, RigToJson(rig_));
   CaptureOptions options = QuickCapture();
   options.tries = 0;
-  EXPECT_THAT(ErrorOf(Begin(options)), IsError(ErrorCode::kInvalidArgument, "tries is 0"));
+  EXPECT_THAT(ErrorOf(Begin(options)), IsError(ErrorCode::kInvalidArgument, "tries = 0"));
   EXPECT_THAT(ErrorOf(Resume()), IsError(ErrorCode::kIo, "journal.jsonl"));
   EXPECT_FALSE(fs::exists(dir_));
 }
@@ -469,8 +469,10 @@ TEST_F(CaptureTest, VerifyNamesEachDamage) {
   expect([&] { fs::remove(dir_ / "session.json"); }, "not completed");
   expect([&] { fs::remove(dir_ / "rig.json"); }, "rig.json");
   expect(replace("rig.json", "led-3", "led-x"), "rig.json: its SHA-256");
-  expect(replace("session.json", "\"iso\": 100.0", "\"iso\": 101.0"), "tells of other frames");
-  expect(replace("journal.jsonl", "\"iso\":100.0}}", "\"iso\":101.0}}"), "tells of other frames");
+  expect(replace("session.json", "\"iso\": 100.0", "\"iso\": 101.0"),
+         "has other frames than session.json");
+  expect(replace("journal.jsonl", "\"iso\":100.0}}", "\"iso\":101.0}}"),
+         "has other frames than session.json");
   expect(replace("journal.jsonl", "{\"record\":\"complete\"}\n", ""),
          "continue it: sateen capture --resume");
   expect([&] { fs::remove(dir_ / "journal.jsonl"); }, "journal.jsonl: is missing");
