@@ -164,7 +164,7 @@ Status MeasureRandomBytes(uint64_t count) {
     (*board)->TakeSent();
   }
   int times_on = 0;
-  for (const sateen::LightRecord& record : (*board)->Records()) {
+  for (const sateen::ChannelRecord& record : (*board)->Records()) {
     times_on += record.times_on;
   }
   LightBoard host(std::make_unique<SimulatedPort>(**board));

@@ -5,7 +5,6 @@
 #include <utility>
 
 #include "core/statistics.h"
-
 #include "rig/projection.h"
 
 namespace sateen {

@@ -141,7 +141,7 @@ class Stress {
   }
 
   void Finish(SimTime start) {
-    const std::vector<LightRecord> records = board_.Records();
+    const std::vector<ChannelRecord> records = board_.Records();
     for (size_t k = 0; k < records.size(); ++k) {
       result_.over_time += records[k].longest_on > host_->Info().lights[k].max_on ? 1 : 0;
     }

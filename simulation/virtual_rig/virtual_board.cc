@@ -123,8 +123,8 @@ std::vector<int> VirtualBoard::Lit() const {
   return lit;
 }
 
-std::vector<LightRecord> VirtualBoard::Records() const {
-  std::vector<LightRecord> records = records_;
+std::vector<ChannelRecord> VirtualBoard::Records() const {
+  std::vector<ChannelRecord> records = records_;
   for (size_t k = 0; k < records.size(); ++k) {
     if (levels_[k] > 0) {
       records[k].longest_on = std::max(records[k].longest_on, Now() - on_since_[k]);
@@ -172,7 +172,7 @@ void VirtualBoard::SetLevel(size_t light, double level) {
   if (level == levels_[light]) {
     return;
   }
-  LightRecord& record = records_[light];
+  ChannelRecord& record = records_[light];
   if (levels_[light] == 0) {
     if (!off_since_[light] || Now() - *off_since_[light] >= kShortestBreak) {
       on_since_[light] = Now();

@@ -37,7 +37,7 @@ struct LightChange {
 
 // What a light has done since ClearRecords(). A break of less than 0.1 ms, as while its level
 // changes, is none.
-struct LightRecord {
+struct ChannelRecord {
   SimTime longest_on{};  // the longest time that it was on without a break, until now
   double highest_level = 0;
   int times_on = 0;
@@ -86,7 +86,7 @@ class VirtualBoard {
   [[nodiscard]] double Level(int light) const { return levels_[static_cast<size_t>(light)]; }
   [[nodiscard]] std::vector<int> Lit() const;
   [[nodiscard]] bool ShutterClosed() const { return shutter_closed_; }
-  [[nodiscard]] std::vector<LightRecord> Records() const;
+  [[nodiscard]] std::vector<ChannelRecord> Records() const;
   void ClearRecords();
 
   void Reset(ResetCause cause = ResetCause::kExternal) { chip_->Reset(cause); }
@@ -122,7 +122,7 @@ class VirtualBoard {
   std::vector<double> levels_;
   std::vector<SimTime> on_since_;
   std::vector<std::optional<SimTime>> off_since_;  // absent for a light that never was on
-  std::vector<LightRecord> records_;
+  std::vector<ChannelRecord> records_;
   bool shutter_closed_ = false;
   uint64_t times_plugged_ = 1;
 };

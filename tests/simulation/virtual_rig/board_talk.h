@@ -194,7 +194,7 @@ class BoardTest : public ::testing::Test {
   }
 
   void CheckRecords() {
-    const std::vector<LightRecord> records = board_->Records();
+    const std::vector<ChannelRecord> records = board_->Records();
     for (size_t k = 0; k < records.size(); ++k) {
       EXPECT_LE(records[k].longest_on, SimTime(may_[k].on) + kTimerSlack) << "light " << k;
       EXPECT_LE(records[k].highest_level, may_[k].level + 1e-9) << "light " << k;

@@ -8,6 +8,7 @@
 #include <cerrno>
 
 #include "core/file_io.h"
+#include "scanner/capture/session_proof.h"
 #include "tests/simulation/virtual_rig/capture_fakes.h"
 
 // A capture that is killed, or whose disk is full, at each call that changes a file. The calls are

@@ -66,7 +66,7 @@ TEST_F(CaptureTest, TakesEveryFrameOfThePlanByItsOwnLight) {
   EXPECT_EQ(summary->session.frames[11].file, "frames/11-led-0-again.dng");
   EXPECT_EQ(summary->session.frames[11].role, FrameRole::kRepeat);
   EXPECT_EQ(summary->session.frames[12].role, FrameRole::kDark);
-  const std::vector<LightRecord> records = board_->Records();
+  const std::vector<ChannelRecord> records = board_->Records();
   for (size_t k = 0; k < rig_.lights.size(); ++k) {
     EXPECT_EQ(records[k].times_on, k == 0 ? 2 : 1) << k;
   }
@@ -275,7 +275,7 @@ TEST_F(CaptureTest, WithoutAFrameTheSameCommandDoes) {
   const Status busy = Fail(ErrorCode::kDevice, "camera is busy");
   camera_.fail_next = {busy, busy, busy};
   const Error error = ErrorOf(Begin());
-  EXPECT_THAT(error, IsError(ErrorCode::kDevice, "give the same command again"));
+  EXPECT_THAT(error, IsError(ErrorCode::kDevice, "run the same command again"));
   EXPECT_THAT(error.message, Not(HasSubstr("--resume")));
   EXPECT_TRUE(Begin());
 }

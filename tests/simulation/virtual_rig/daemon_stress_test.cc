@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 
+#include "scanner/capture/session_proof.h"
 #include "scanner/daemon/rig_jobs.h"
 
 namespace sateen::testing::daemon_stress_test {

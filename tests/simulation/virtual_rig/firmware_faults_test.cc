@@ -136,7 +136,7 @@ TEST_F(FirmwareFaults, OutputsAreOffFromTheFirstCycleOfEachReset) {
     EXPECT_FALSE(board_->ShutterClosed());
     board_->ClearRecords();
     board_->RunFor(milliseconds(50));
-    for (const LightRecord& record : board_->Records()) {
+    for (const ChannelRecord& record : board_->Records()) {
       EXPECT_EQ(record.times_on, 0) << Name(cause);
     }
     EXPECT_EQ(talk_->Hello().reset_cause, static_cast<int>(cause));
@@ -282,7 +282,7 @@ TEST_F(FirmwareFaults, RandomBytesLightNothing) {
     board_->RunUntil([&] { return board_->InnerChip().BytesUnderWay() == 0; }, seconds(1));
     talk_->Frames();
   }
-  for (const LightRecord& record : board_->Records()) {
+  for (const ChannelRecord& record : board_->Records()) {
     EXPECT_EQ(record.times_on, 0);
   }
   EXPECT_FALSE(board_->ShutterClosed());

@@ -160,7 +160,7 @@ TEST_F(FirmwareLimits, ValuesOutOfRangeChangeNothing) {
             SATEEN_RESULT_OUT_OF_RANGE);
   EXPECT_EQ(talk_->Do(SateenConfigure{.max_lit = 1, .sync_edge = 2}).result,
             SATEEN_RESULT_OUT_OF_RANGE);
-  for (const LightRecord& record : board_->Records()) {
+  for (const ChannelRecord& record : board_->Records()) {
     EXPECT_EQ(record.times_on, 0);
   }
   const SateenGreeting greeting = talk_->Hello();
