@@ -209,7 +209,7 @@ TEST_F(PtpCameraFaults, AFileThatIsNeverAnnouncedEndsAtTheDeadline) {
   options_.settle = milliseconds(0);
   const auto camera = Opened();
   Virtual().Inject(CameraFault::kNoEvent);
-  ExpectFailure(*camera, ErrorCode::kTimeout, "no file came in time", kShort);
+  ExpectFailure(*camera, ErrorCode::kTimeout, "no file arrived in time", kShort);
   EXPECT_EQ(camera->state(), State::kLost);
   ExpectNextFrameIsItsOwn(*camera);
 }
@@ -218,7 +218,7 @@ TEST_F(PtpCameraFaults, ALateFileIsNotTakenForTheNextFrame) {
   options_.settle = seconds(2);  // the file comes after 1.2 s
   const auto camera = Opened();
   Virtual().Inject(CameraFault::kLateEvent);
-  ExpectFailure(*camera, ErrorCode::kTimeout, "no file came in time", kShort);
+  ExpectFailure(*camera, ErrorCode::kTimeout, "no file arrived in time", kShort);
   ExpectNextFrameIsItsOwn(*camera);
 }
 
@@ -226,7 +226,7 @@ TEST_F(PtpCameraFaults, ALateFileInTheNextExposureIsNotTakenForIt) {
   options_.settle = milliseconds(0);
   const auto camera = Opened();
   Virtual().Inject(CameraFault::kLateEvent);
-  ExpectFailure(*camera, ErrorCode::kTimeout, "no file came in time", kShort);
+  ExpectFailure(*camera, ErrorCode::kTimeout, "no file arrived in time", kShort);
   ASSERT_TRUE(camera->Open());
   ASSERT_TRUE(camera->Configure({.exposure_s = 2.0}));
   const Result<CapturedFile> frame = camera->Capture(folder_, kLong);
