@@ -276,7 +276,7 @@ TEST_F(CalibrateLensCommand, AnErrorLeavesTheRigAlone) {
   fails(lens("table", "chessboard:9x6:25mm"), 3, "table: no chessboard");
   fails(lens("boards", "charuco:9x7"), 2, "board 'charuco:9x7'; need");
   fails(lens("table", kBoard), 3, "1 usable views of the board of 1; need 3");
-  fails(lens("nothing", kBoard), 4, "nothing: is not there");
+  fails(lens("nothing", kBoard), 4, "nothing: does not exist");
   fails(pose("table", "charuco:9x7:25mm:18mm"), 3, "is in none of 1 photographs");
   fails(pose("boards", kBoard), 3, "the board or the camera moved");
   fails(pose("table", ""), 2, "does not say which board");
