@@ -1,5 +1,6 @@
-// What the LED board, its link and the virtual rig show: the table of bars, each measured anew with
-// the real firmware. `board_bench --full` takes the numbers of the bars (minutes); without it, 2 %.
+// Measures every bar of the LED board, its link and the virtual rig, anew with the real firmware,
+// and prints the table. `board_bench --full` takes the numbers of the bars (minutes); without it,
+// 2 %.
 #include <fmt/format.h>
 #include <sys/wait.h>
 
@@ -50,7 +51,8 @@ void Row(const std::string& what, const std::string& measured, const std::string
   std::fflush(stdout);
 }
 
-// The other half of MeasureRoundTrips(), run under the virtual rig: prints microseconds, a line each.
+// The other half of MeasureRoundTrips(), run under the virtual rig: prints one line per
+// round trip, in microseconds.
 int RoundTripHost(int count) {
   LightBoard host(sateen::MakeSerialPort(""));
   if (const Status connected = host.Connect(); !connected) {

@@ -1,6 +1,6 @@
-// What captures must show: the table of bars, each measured anew on the virtual rig: the board's real
-// firmware, real libserialport, libgphoto2 and LibRaw. `capture_bench --full` takes the numbers of the
-// bars (half an hour); without it, a few of each.
+// Measures every bar that captures must meet, anew on the virtual rig, and prints the table: the
+// board's real firmware, real libserialport, libgphoto2 and LibRaw. `capture_bench --full` takes
+// the numbers of the bars (half an hour); without it, a few of each.
 #include <fmt/format.h>
 #include <sys/wait.h>
 
@@ -213,7 +213,7 @@ void MeasureKills(CaptureBench& bench, int kills) {
 }
 
 struct Fault {
-  const char* commands;  // of the rig, at one capture; more than one by ';'
+  const char* commands;  // commands to the rig at one capture; ';' separates several
 };
 
 constexpr std::array kFaults = {Fault{"camera busy"},
@@ -309,7 +309,8 @@ void MeasureFaults(CaptureBench& bench, size_t stride) {
       "none wrong", wrong.empty());
 }
 
-// The other half of MeasureRepeats(), run under the rig: sessions in one process, one after the other.
+// The other half of MeasureRepeats(), run under the rig: one session after another in one
+// process.
 int RepeatHost(const fs::path& rig, const fs::path& out, int sessions) {
   const char* camera = std::getenv("SATEEN_CAMERA");  // the virtual rig's
   sateen::RigDevices devices({.camera = camera != nullptr ? camera : ""});

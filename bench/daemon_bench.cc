@@ -1,5 +1,5 @@
-// The daemon under random API calls, right and wrong, with the real firmware in simulated time. The bar:
-// --rate 200 --seconds 60 under the address sanitizer.
+// The daemon under random API calls, right and wrong, with the real firmware in simulated time. The
+// bar: --rate 200 --seconds 60 under the address sanitizer.
 #include <fmt/format.h>
 #include <sys/resource.h>
 

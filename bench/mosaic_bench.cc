@@ -287,7 +287,7 @@ Run Solve(const fs::path& session, const fs::path& maps) {
   return run;
 }
 
-// What LibRaw takes to unpack the files and interpolate their colours, on as many threads.
+// Returns the time of LibRaw to unpack the files and interpolate their colours, on as many threads.
 double LibRawSeconds(const fs::path& session) {
   std::vector<fs::path> files;
   for (const auto& entry : fs::directory_iterator(session / "frames")) {

@@ -1,5 +1,6 @@
 // Single parts of the solver on one thread: the kernel per light model, with ordinary and with
-// subnormal radiance, and with the noise for weights; the bytes alone; table positions; one pixel of the reference.
+// subnormal radiance, and with the noise for weights; the bytes alone; table positions; one pixel
+// of the reference.
 
 #include <benchmark/benchmark.h>
 

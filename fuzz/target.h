@@ -5,10 +5,11 @@
 
 namespace sateen::fuzz {
 
-// What is fuzzed: each target defines it. LLVMFuzzerTestOneInput calls it.
+// Runs the code that is fuzzed. Each target defines it, and LLVMFuzzerTestOneInput calls it.
 void Try(std::string_view bytes);
 
-// A folder for readers that take paths: in memory where the system has /dev/shm, removed at the end.
+// Returns a folder for readers that take paths: in memory where the system has /dev/shm, removed at
+// the end.
 [[nodiscard]] const std::filesystem::path& Folder();
 
 // Writes the bytes into a file of Folder() and returns its path. Ends the program where it cannot.

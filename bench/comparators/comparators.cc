@@ -34,8 +34,8 @@ Estimator Reweighted(std::function<double(double residual, double scale)> weight
   };
 }
 
-// Equations 9 to 12 of "Robust photometric stereo using sparse regression": i = l n + e + noise, with
-// a variance for each entry of e by expectation maximisation.
+// Equations 9 to 12 of "Robust photometric stereo using sparse regression": i = l n + e + noise,
+// with a variance for each entry of e by expectation maximisation.
 Eigen::Vector3d SparseBayesian(const Eigen::MatrixX3d& l, const Eigen::VectorXd& samples) {
   const Eigen::Index count = l.rows();
   const double scale = samples.mean();

@@ -10,7 +10,8 @@
 
 namespace sateen {
 
-// A normal for each pixel, on one thread, in dynamic double matrices, as their authors' code has it.
+// Solvers of a normal per pixel, on one thread, in dynamic double matrices, as in their authors'
+// code.
 enum class Comparator {
   kBdcSvd,         // least squares of the whole image at once, every sample; distant lights alone
   kLeastSquares,   // per pixel, usable samples, as the three below

@@ -267,7 +267,8 @@ json GphotoSession::Set(const std::string& name, const std::string& value) {
   return code < GP_OK ? Failure(code, "setting " + name + " to " + value) : json::object();
 }
 
-// Of some cameras libgphoto2 says nothing but that a capture has failed: Nikon's.
+// Returns whether the card has room, or true if that is not known. On a full card libgphoto2 says
+// no more of some cameras, Nikon's, than that a capture has failed.
 bool GphotoSession::CardHasRoom() {
   CameraStorageInformation* raw = nullptr;
   int count = 0;

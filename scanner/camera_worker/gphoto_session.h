@@ -14,15 +14,16 @@ namespace sateen {
 // block for ever; whoever waits kills this process then.
 //
 // Each request {"do": ...} has one answer. Where it fails that is {"error": {"code", "text",
-// "while"}}, code as libgphoto2 has it; {"error": {"errno", "path"}} where a file of this computer cannot
-// be written, which is not the camera's fault.
+// "while"}}, code as libgphoto2 has it; {"error": {"errno", "path"}} where a file of this computer
+// cannot be written, which is not the camera's fault.
 //
 //     do        fields                     answer
 //     list                                 cameras [{model, port}]
 //     open      port, settle_ms            events of the first settle_ms are thrown away
 //     get       name                       value, choices, readonly; or absent
 //     set       name, value
-//     trigger   wait_ms                    after_ms: when the try began that went well; waits while it is busy
+//     trigger   wait_ms                    after_ms: start of the try that went well; waits while
+//                                          the camera is busy
 //     await     wait_ms                    folder, name of a file that has been added, or neither
 //     info      folder, name               bytes, as the camera says
 //     download  folder, name, path
@@ -50,7 +51,7 @@ class GphotoSession {
                           const std::string& path);
   nlohmann::json Delete(const std::string& folder, const std::string& name);
   nlohmann::json Close();
-  // Of libgphoto2's `code`, with the latest words that it had for it.
+  // Returns the error of libgphoto2's `code`, with the latest words that it had for it.
   nlohmann::json Failure(int code, const std::string& during);
 
   _GPContext* context_;

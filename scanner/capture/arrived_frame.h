@@ -12,8 +12,8 @@
 
 namespace sateen {
 
-// A frame that has arrived: another thread checks it (CheckFrame) and flushes it to the disk while the
-// next one is taken. Its destructor waits for that thread.
+// A frame that has arrived: another thread checks it (CheckFrame) and flushes it to the disk while
+// the next one is taken. Its destructor waits for that thread.
 class ArrivedFrame {
  public:
   // frame    its place in the plan

@@ -22,13 +22,13 @@ struct CaptureOptions {
   double level = 1.0;
   // Time from turning a light on to the exposure; 0 to 1.5 s: then the board must hear something.
   std::chrono::milliseconds settle{30};
-  // Time beyond the exposure that a light may stay on, until the camera has delivered. 1 ms to 60 s; no
-  // longer than the board allows.
+  // Time beyond the exposure that a light may stay on, until the camera has delivered. 1 ms to
+  // 60 s; no longer than the board allows.
   std::chrono::milliseconds margin{6000};
   // Longest wait for a frame beyond its exposure; at least 1 ms.
   std::chrono::milliseconds deadline{30'000};
-  // Interval of talking to the board while the camera exposes, in a thread of its own, so that it keeps
-  // the light on; less than its 2 s of silence. 0: never, for a board in simulated time.
+  // Interval of talking to the board while the camera exposes, in a thread of its own, so that it
+  // keeps the light on; less than its 2 s of silence. 0: never, for a board in simulated time.
   std::chrono::milliseconds keep_alive{400};
   // Number of times that a frame is tried before its failure ends the capture; at least 1.
   int tries = 3;

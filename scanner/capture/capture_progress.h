@@ -31,7 +31,8 @@ class CaptureProgress {
   void SetObserver(CaptureObserver observer) { observer_ = std::move(observer); }
   void SetPeak(double peak) { peak_ = peak; }
   void AddCameraTime(double seconds) { camera_s_ += seconds; }
-  // Counts a frame that was kept, also if it is rejected later: the time left is estimated from these.
+  // Counts a frame that was kept, also if it is rejected later. The time left is estimated from the
+  // kept frames.
   void AddFrame() { ++frames_; }
 
   // Tells the observer the state of the store and which frame is being taken.

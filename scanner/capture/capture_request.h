@@ -38,7 +38,7 @@ struct CaptureForecast {
   CaptureRequest request;
   FramePlan plan;               // at one exposure where it is still to be found
   bool exposure_known = false;  // given by hand
-  std::string port;             // of the board
+  std::string port;             // port of the board
   std::string firmware;
   CameraInfo camera;
   ExposureSettings settings;  // as the camera has them now

@@ -11,7 +11,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kRounds = 2;     // of taking again what the checks reject
+constexpr int kRounds = 2;     // rounds of taking again what the checks reject
 constexpr int kMostPlans = 3;  // because a light was brighter than the exposures found
 
 }  // namespace

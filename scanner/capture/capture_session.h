@@ -36,22 +36,24 @@ struct CaptureSummary {
 /// 1. Exposures that are not given are found by test frames of the brightest light (FindExposures),
 ///    and found again where a light turns out to be brighter.
 /// 2. Each frame is taken under its light alone, checked by itself and recorded (PlanTaker).
-/// 3. When all are there they are compared with each other (CheckCapture). A frame that cannot be right
-///    is rejected, and taken again once where that may help.
+/// 3. When all are there they are compared with each other (CheckCapture). A frame that cannot be
+///    right is rejected, and taken again once where that may help.
 ///
-/// Killed at any moment, with any file half written, the capture continues with Resume(): frames that
-/// the journal says are done and whose hashes still hold are not taken again.
+/// Killed at any moment, with any file half written, the capture continues with Resume(): frames
+/// that the journal says are done and whose hashes still hold are not taken again.
 ///
 ///     state of the store   Run()                                  Finish()
 ///     begun                plans, takes, checks -> complete       not legal
 ///     planned              takes what is open, checks -> complete not legal
-///     complete             not legal                              checks; writes session.json if missing
+///     complete             not legal                              checks; writes session.json if
+///                                                                 it is missing
 ///
-/// An error leaves the store begun or planned, so that Resume() continues; its message says so once.
+/// An error leaves the store begun or planned, so that Resume() continues. Its message says
+/// so once.
 ///
 /// Errors   kInvalidArgument: options; a folder that holds a session
-///          kBadData: rig or journal; a frame that fails its checks as often as it is tried, or that is
-///          clipped at an exposure given by hand, which is not tried again
+///          kBadData: rig or journal; a frame that fails its checks as often as it is tried, or
+///          that is clipped at an exposure given by hand, which is not tried again
 ///          kDevice, kTimeout: board or camera, after all tries; kIo: the disk; kCancelled
 /// After any error, and at the end of its life, all lights have been told to go off.
 class CaptureSession {
@@ -60,10 +62,12 @@ class CaptureSession {
   [[nodiscard]] static Result<CaptureSession> Begin(const std::filesystem::path& dir,
                                                     const std::filesystem::path& rig_file,
                                                     const CaptureOptions& options);
-  // Continues the capture in `dir`. Kind, exposure and level are the journal's, not those of `options`.
+  // Continues the capture in `dir`. Kind, exposure and level are the journal's, not those of
+  // `options`.
   [[nodiscard]] static Result<CaptureSession> Resume(const std::filesystem::path& dir,
                                                      const CaptureOptions& options);
-  // Makes Run() take every frame again at this exposure, or at one that it finds. Later runs keep it.
+  // Makes Run() take every frame again at this exposure, or at one that it finds. Later runs keep
+  // that exposure.
   // kInvalidArgument: the session is complete.
   [[nodiscard]] Status ChangeExposure(std::optional<double> exposure_s);
 
@@ -79,7 +83,7 @@ class CaptureSession {
   // `camera` is open. Connects the board where it is not.
   [[nodiscard]] Result<CaptureSummary> Run(LightBoard& board, TetheredCamera& camera,
                                            const Task& task, const CaptureObserver& observer = {});
-  // Checks the frames of a complete journal without devices. Writes session.json where it is missing.
+  // Checks the frames of a complete journal without devices. Writes session.json if it is missing.
   [[nodiscard]] Result<CaptureSummary> Finish();
 
  private:
@@ -102,7 +106,7 @@ class CaptureSession {
     std::optional<double> exposure_s;
   };
   std::optional<AskedAnew> asked_anew_;  // until there is a plan for it
-  FrameLooks looks_;                     // of done frames
+  FrameLooks looks_;                     // looks of done frames
   std::optional<std::size_t> brighter_;  // light that is too bright for the plan
   CaptureProgress progress_;
 };

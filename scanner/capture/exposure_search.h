@@ -10,10 +10,11 @@
 namespace sateen {
 
 struct ExposureGoal {
-  // Target of the 99.9th percentile of the brightest light's frame, relative to saturation. (0, 0.95]
+  // Target of the 99.9th percentile of the brightest light's frame, relative to saturation.
+  // (0, 0.95]
   double peak = 0.8;
-  // 10th percentile below which a longer exposure is added, relative to saturation: DarkestUseful() of
-  // the rig's response. [0, 1)
+  // 10th percentile below which a longer exposure is added, relative to saturation: DarkestUseful()
+  // of the rig's response. [0, 1)
   double low = 0.004;
   // Largest number of exposures per light; 1 to 3.
   int most = 3;
@@ -21,21 +22,21 @@ struct ExposureGoal {
   double longest_s = 5.0;
 };
 
-// Returns the signal, relative to saturation, at which the sensor's noise is a tenth of it: from the
-// response's gain g and read noise r, s = 50 g (1 + sqrt(1 + r^2 / (25 g^2))) in DN; 0.004 without a
-// response.
+// Returns the signal, relative to saturation, at which the sensor's noise is a tenth of it: from
+// the response's gain g and read noise r, s = 50 g (1 + sqrt(1 + r^2 / (25 g^2))) in DN; 0.004
+// without a response.
 [[nodiscard]] double DarkestUseful(const std::optional<Response>& response);
 
-/// Finds the exposure of a scene by test frames of its brightest light. A reading is proportional to
-/// the exposure time, so a frame that is neither clipped nor nearly black gives the answer:
+/// Finds the exposure of a scene by test frames of its brightest light. A reading is proportional
+/// to the exposure time, so a frame that is neither clipped nor nearly black gives the answer:
 ///
 ///     t = t_test goal.peak / peak_test, as the camera's next shorter time                     (1)
 ///
 /// * A clipped frame is tried again at an eighth of its time.
-/// * A frame below a tenth of full scale is tried again at the time that (1) gives, at most sixteenfold
-///   and below what was clipped.
-/// * Where the dark parts are below goal.low at t, longer exposures follow, each eight times the one
-///   before, until they are not, `most` are reached, or the camera has no longer time.
+/// * A frame below a tenth of full scale is tried again at the time that (1) gives, at most
+///   sixteenfold and below what was clipped.
+/// * Where the dark parts are below goal.low at t, longer exposures follow, each eight times the
+///   one before, until they are not, `most` are reached, or the camera has no longer time.
 ///
 /// Errors   kInvalidArgument: no times to choose from
 ///          kBadData, of Take(): too bright at the shortest time or nothing to see at the longest

@@ -11,7 +11,8 @@
 
 namespace sateen {
 
-// The frames that a capture takes, in this order: role, light and exposure_s. The rest is not known yet.
+// Frames that a capture takes, in this order: role, light and exposure_s. The rest is still
+// unknown.
 using FramePlan = std::vector<SessionFrame>;
 
 // Returns the plan: the dark, every light of the rig in its order at each exposure, the first light
@@ -24,7 +25,8 @@ using FramePlan = std::vector<SessionFrame>;
 // Returns the frame's light by its index in the rig; nothing for a dark frame.
 [[nodiscard]] std::optional<std::size_t> LightOf(const Rig& rig, const SessionFrame& planned);
 
-// Returns whether the frame is its light's first exposure, which holds its bright parts, or a dark one.
+// Returns whether the frame is a dark one or its light's first exposure, which holds the bright
+// parts.
 [[nodiscard]] bool IsFirstExposure(const FramePlan& plan, std::size_t frame);
 
 // Returns "dark", "led-0" or "led-0 again".

@@ -18,7 +18,7 @@ namespace sateen {
 struct FrameSettings {
   double f_number = 8.0;
   double iso = 100.0;
-  double level = 1.0;  // of the light, (0, 1]
+  double level = 1.0;  // level of the light, (0, 1]
 };
 
 // A frame as the camera delivered it.
@@ -38,12 +38,12 @@ struct TakenFrame {
 ///     unset   are not known           sets them -> set          -> unset
 ///     set     are those asked for     sets them if they differ  -> unset
 ///
-/// A failed Take() leaves the state as it is; one that failed to set the camera leaves it unset. After
-/// any failure all lights have been told to go off.
+/// A failed Take() leaves the state as it is; one that failed to set the camera leaves it unset.
+/// After any failure all lights have been told to go off.
 class FrameTaker {
  public:
-  // `camera` is open; the board is connected where it is not. Of `options`: settle, margin, deadline,
-  // keep_alive.
+  // `camera` is open; the board is connected where it is not. Of `options`: settle, margin,
+  // deadline, keep_alive.
   FrameTaker(LightBoard& board, TetheredCamera& camera, const FrameSettings& settings,
              const CaptureOptions& options, const Task& task);
 
@@ -53,8 +53,8 @@ class FrameTaker {
   [[nodiscard]] Result<TakenFrame> Take(const std::optional<Light>& light, double exposure_s,
                                         const std::filesystem::path& folder);
 
-  // Opens the camera again where `error` may have been its fault, kDevice or kTimeout. Fails with both
-  // errors.
+  // Opens the camera again where `error` may have been its fault, kDevice or kTimeout. Fails with
+  // both errors.
   [[nodiscard]] Status Recover(const Error& error);
 
   // Returns whether the latest failure needs a person, as a full memory card does.

@@ -176,7 +176,7 @@ class JournalReader {
     return json.Finish();
   }
 
-  // Of a record that has failed: its first failure.
+  // Returns the first failure of a record that has failed.
   static Status Finished(JsonReader& json) {
     Status status = json.Finish();
     SATEEN_CHECK(!status);

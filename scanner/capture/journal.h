@@ -20,7 +20,7 @@ struct JournalBegun {
   std::optional<double> exposure_s;  // asked for most recently; absent: to be found
   double f_number = 8.0;
   double iso = 100.0;
-  double level = 1.0;  // of the lights
+  double level = 1.0;  // level of the lights
   int brackets = 3;    // largest number of exposures per light where they are to be found
 };
 
@@ -30,15 +30,17 @@ struct PlannedExposure {
   std::optional<double> exposure_s;  // absent: to be found
 };
 
-/// journal.jsonl of a session that is being captured, one JSON object a line, each on the disk before
-/// the capture goes on:
+/// journal.jsonl of a session that is being captured, one JSON object per line, each on the disk
+/// before the capture goes on:
 ///
 ///     {"schema": "sateen.journal/1", "record": "begun", "kind", "rig", "rig_sha256", "exposure_s",
-///      "f_number", "iso", "level", "brackets"}           exposure_s: absent where it is to be found
-///     {"record": "planned", "reason": "...", "exposure_s", "plan": [{"role", "light", "exposure_s"}, ...]}
-///                                                       all frames of an earlier plan are open again;
-///                                                       exposure_s: from here on instead of begun's, 0
-///                                                       where it is to be found; absent: as before
+///      "f_number", "iso", "level", "brackets"}           exposure_s: absent if it is to be found
+///     {"record": "planned", "reason": "...", "exposure_s",
+///      "plan": [{"role", "light", "exposure_s"}, ...]}
+///                                                       all frames of an earlier plan are open
+///                                                       again; exposure_s: from here on instead of
+///                                                       begun's, 0 where it is to be found;
+///                                                       absent: as before
 ///     {"record": "frame begun", "frame": 3}             3: its place in the plan, from 0
 ///     {"record": "frame done", "frame": 3, "is": {...}}           as in session.json, all keys
 ///     {"record": "frame rejected", "frame": 3, "reason": "..."}   begun or done before
@@ -54,15 +56,16 @@ struct Journal {
   std::vector<std::optional<SessionFrame>> done;  // one for each of the plan
   int rejected = 0;                               // records of it
   bool complete = false;
-  // Length of the whole lines. What is beyond was being written when the power went; it does not count.
+  // Length of the whole lines. A part of a line beyond them was being written when the power went.
+  // It does not count.
   std::uint64_t whole_bytes = 0;
 };
 
 /// Reads journal.jsonl in `dir`; nothing where not even its first line is whole.
 ///
 /// Errors   kIo: absent or unreadable
-///          kBadData, naming the line: not JSON, a key missing, unknown or out of range, a record that
-///          cannot follow the ones before it. Only a last line without its newline is dropped.
+///          kBadData, naming the line: not JSON, a key missing, unknown or out of range, a record
+///          that cannot follow the ones before it. Only a last line without its newline is dropped.
 [[nodiscard]] Result<std::optional<Journal>> ReadJournal(const std::filesystem::path& dir);
 
 // The same from text; `where` opens messages.

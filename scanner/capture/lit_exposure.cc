@@ -29,8 +29,8 @@ class LightsOff {
   LightBoard& board_;
 };
 
-// Talks to the board while the camera exposes, so that it keeps the light on, and turns the light off
-// at once if the capture is cancelled. Nobody else uses the board until Stop().
+// Talks to the board while the camera exposes, so that it keeps the light on, and turns the light
+// off at once if the capture is cancelled. Nobody else uses the board until Stop().
 class KeepAlive {
  public:
   KeepAlive(LightBoard& board, milliseconds interval, const Task& task)

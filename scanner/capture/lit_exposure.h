@@ -15,7 +15,7 @@ namespace sateen {
 // One exposure under one light.
 struct LitExposure {
   std::optional<Light> light;  // absent: the dark
-  double level = 1.0;          // of the light, (0, 1]
+  double level = 1.0;          // level of the light, (0, 1]
   double exposure_s = 0.0;     // as the camera has it
 };
 
@@ -30,12 +30,12 @@ struct LitFrame {
 ///        alone is on.
 ///     2. The camera exposes and delivers into `folder`. A thread keeps talking to the board, which
 ///        turns everything off when it hears nothing for 2 s.
-///     3. The board is asked again: the frame is worthless if the light went off before the camera had
-///        delivered, or if the board restarted.
+///     3. The board is asked again: the frame is worthless if the light went off before the camera
+///        had delivered, or if the board restarted.
 ///     4. All lights go off, and the board confirms it.
 ///
-/// Connects the board where it is not. In every case all lights have been told to go off at the end; a
-/// cancelled task turns them off at once.
+/// Connects the board where it is not. In every case all lights have been told to go off at the
+/// end; a cancelled task turns them off at once.
 ///
 /// Errors   kDevice, kTimeout: board or camera; kIo: the disk; kCancelled
 [[nodiscard]] Result<LitFrame> ExposeLit(LightBoard& board, TetheredCamera& camera,

@@ -10,7 +10,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kFabricPeak = 0.8;  // of what saturates
+constexpr double kFabricPeak = 0.8;  // share of what saturates
 constexpr double kSheetPeak = 0.6;   // its readings must be proportional to 0.2 %
 constexpr int kMostTests = 8;        // frames to find an exposure by
 

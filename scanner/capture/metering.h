@@ -16,10 +16,10 @@ namespace sateen {
 struct MeteringOptions {
   SessionKind kind = SessionKind::kFabric;  // a sheet has one exposure, and a lower peak
   int brackets = 3;                         // largest number of exposures per light; 1 to 3
-  int tries = 3;                            // of board and camera per test frame
+  int tries = 3;                            // tries of board and camera per test frame
 };
 
-// Is told of each test frame before it is taken, and of what it shows.
+// Observer that is told of each test frame before it is taken, and of what it shows.
 struct MeteringObserver {
   std::function<void(double exposure_s)> on_test;
   std::function<void(const SignalLevels& levels)> on_levels;
@@ -32,8 +32,8 @@ struct MeteringObserver {
 ///
 /// folder   receives the test frames; it is emptied before each
 /// Returns  exposure times, ascending. [s]
-/// Errors   those of ExposureSearch and, after all tries, of the devices; kDevice: 8 test frames were
-///          not enough
+/// Errors   those of ExposureSearch and, after all tries, of the devices; kDevice: 8 test frames
+///          were not enough
 [[nodiscard]] Result<std::vector<double>> FindExposures(const Rig& rig, std::size_t light,
                                                         const MeteringOptions& options,
                                                         const std::filesystem::path& folder,

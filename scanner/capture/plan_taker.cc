@@ -136,7 +136,7 @@ Result<std::optional<std::size_t>> PlanTaker::TakeOpenFrames() {
     }
     arrived = std::move(next);
   }
-  if (arrived) {  // what arrived before it went wrong is not lost
+  if (arrived) {  // a frame that arrived before the failure is not lost
     const Status settled = Settle(*std::move(arrived));
     status = status && !settled && !brighter_ ? settled : status;
   }

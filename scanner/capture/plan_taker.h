@@ -21,13 +21,13 @@ using FrameLooks = std::vector<std::optional<FrameLook>>;
 /// Takes the open frames of a store's plan. While a frame is taken, the one before is checked and
 /// flushed by another thread.
 ///
-///     a frame is   by                                              and then
-///     open         its turn                                        taken: recorded as begun
-///     taken        a failure of board, camera or check             open, at most options.tries times
-///     taken        saturation at an exposure given by hand         open; an error, no other try
-///     taken        saturation of a light's first exposure          open; TakeOpenFrames() ends, since
-///                  where exposures are found                       the light is brighter than they allow
-///     taken        a check that passes                             done: moved into place and recorded
+///     a frame is   by                                        and then
+///     open         its turn                                  taken: recorded as begun
+///     taken        a failure of board, camera or check       open, at most options.tries times
+///     taken        saturation at an exposure given by hand   open; an error, no other try
+///     taken        saturation of a light's first exposure    open; TakeOpenFrames() ends, since
+///                  where exposures are found                 the light is brighter than they allow
+///     taken        a check that passes                       done: moved into place and recorded
 ///
 /// It borrows all its arguments, which outlive it.
 class PlanTaker {

@@ -20,8 +20,8 @@ struct PreviewRequest {
   std::optional<double> exposure_s;  // absent: found by test frames
   double f_number = 8.0;
   double iso = 100.0;
-  double level = 1.0;    // of the light
-  int max_width = 1600;  // of the picture; 16 to 16384 px
+  double level = 1.0;    // level of the light
+  int max_width = 1600;  // width of the picture; 16 to 16384 px
 
   // Names the first field out of range, with its value and its range.
   [[nodiscard]] Status Validate() const;

@@ -14,8 +14,8 @@ inline constexpr const char* kSavedRigFile = "rig.json";  // the rig, as it was 
 
 /// Returns the rig if a capture can begin in `dir`. Changes nothing.
 ///
-/// Errors   kInvalidArgument: options; the folder holds a session that is complete or has a frame, or
-///          frames without a journal
+/// Errors   kInvalidArgument: options; the folder holds a session that is complete or has a frame,
+///          or frames without a journal
 ///          kBadData: the rig has no lights, or two with one channel
 ///          kIo: the rig cannot be read; the folder cannot be written to
 [[nodiscard]] Result<Rig> CheckBegin(const std::filesystem::path& dir,

@@ -22,8 +22,8 @@ struct SessionProof {
 /// * each light has its frame
 /// * each file has the hash that was recorded
 ///
-/// A session whose session.json names no journal, and that has none, was not made by a capture and is
-/// proved by what it records.
+/// A session whose session.json names no journal, and that has none, was not made by a capture and
+/// is proved by what it records.
 ///
 /// Errors   kIo: there is no such folder; kCancelled
 [[nodiscard]] Result<SessionProof> ProveSession(const std::filesystem::path& dir, const Task& task);

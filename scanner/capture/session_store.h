@@ -19,8 +19,8 @@ namespace sateen {
 // Folder in a session that the camera delivers into, while it is captured.
 inline constexpr const char* kIncoming = ".sateen-incoming";
 
-/// The folder of one session while it is captured, and its journal. What has been recorded is on the
-/// disk when a function returns.
+/// The folder of one session while it is captured, and its journal. What has been recorded is on
+/// the disk when a function returns.
 ///
 ///     rig.json          the rig as it was, byte for byte
 ///     journal.jsonl     what was done (scanner/capture/journal.h)
@@ -37,8 +37,8 @@ inline constexpr const char* kIncoming = ".sateen-incoming";
 /// An error of the journal leaves the state as it was (JournalWriter).
 class SessionStore {
  public:
-  /// Creates the folder and begins its journal. A journal without any frame is begun again. Errors as
-  /// CheckBegin(); kIo: another program has it locked.
+  /// Creates the folder and begins its journal. A journal without any frame is begun again. Errors
+  /// as CheckBegin(); kIo: another program has it locked.
   [[nodiscard]] static Result<SessionStore> Begin(const std::filesystem::path& dir,
                                                   const std::filesystem::path& rig_file,
                                                   const CaptureOptions& options);
@@ -65,7 +65,8 @@ class SessionStore {
                                  const std::filesystem::path& delivered);
   // Opens a frame that was begun or done again.
   [[nodiscard]] Status RejectFrame(std::size_t frame, const std::string& reason);
-  // Rejects the done frames whose files have gone or changed. kIo, kBadData: the session is complete.
+  // Rejects the done frames whose files have gone or changed. kIo, kBadData: the session is
+  // complete.
   [[nodiscard]] Status VerifyDone();
   // Removes frames of earlier plans, completes the journal and writes `session` to session.json.
   [[nodiscard]] Status Complete(const Session& session);

@@ -51,7 +51,7 @@ class CaptureChecker {
         1.0;
     FindLevels();
     if (!check_.faults.empty()) {
-      return std::move(check_);  // what every frame suffers from would look like faults of lights
+      return std::move(check_);  // a fault of every frame would look like faults of lights
     }
     FindDark();
     if (has_pattern_) {
@@ -132,8 +132,8 @@ class CaptureChecker {
     }
   }
 
-  // Returns the light if one frame alone seems to be another light's, or to have moved and come back:
-  // the edge of a shadow can look like both.
+  // Returns the light if one frame alone seems to be another light's, or to have moved and come
+  // back: the edge of a shadow can look like both.
   [[nodiscard]] std::optional<size_t> SuspectOf(const CaptureCheck& check) const {
     if (check.faults.size() != 1) {
       return std::nullopt;
@@ -242,7 +242,8 @@ class CaptureChecker {
     const double usual = Median(own);
     for (size_t k = 0; k < signal_.size(); ++k) {
       const LightPatterns::Fit& fit = fits[k];
-      // A shaded frame fits no light; a frame of another light fits that one as well as others theirs.
+      // A shaded frame fits no light. A frame of another light fits that light as well as other
+      // frames fit theirs.
       if (on_[k] && fit.best != k && fit.least < options_.other_light_misfit * fit.own &&
           fit.least < kFitsAsWell * usual) {
         check_.faults.push_back(OtherLightFault(rig_, k, fit.best));

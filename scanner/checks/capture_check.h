@@ -16,7 +16,7 @@ enum class CaptureFaultKind { kDark, kLevel, kOtherLight, kAmbient, kMoved, kSha
 
 struct CaptureFault {
   CaptureFaultKind kind = CaptureFaultKind::kDark;
-  std::vector<std::size_t> lights;  // of the rig; empty: every frame has the fault
+  std::vector<std::size_t> lights;  // lights of the rig; empty: every frame has the fault
   std::string text;                 // finding, and what to do
 };
 
@@ -26,17 +26,17 @@ struct CaptureCheck {
   std::vector<double> levels;      // brightness of each light relative to the calibration
   double ambient = 0.0;            // change of the dark, relative to the lit frames' brightness
   double drift = 0.0;              // change of the first light's brightness, relative
-  // Shift of each light's frame from the first light's, and of the repeat last; empty where there is
-  // too little texture. Those that are significant go into the session as shift_px.
+  // Shift of each light's frame from the first light's, and of the repeat last; empty where there
+  // is too little texture. Those that are significant go into the session as shift_px.
   std::vector<Shift> shifts;
 };
 
 // Frames of a capture by their roles in the checks.
 struct CaptureLooks {
-  std::vector<FrameLook> lit;  // of each light of the rig
+  std::vector<FrameLook> lit;  // one per light of the rig
   FrameLook dark_first;
   FrameLook dark_last;
-  FrameLook repeat;  // of the first light
+  FrameLook repeat;  // second frame of the first light
 };
 
 /// Compares the frames of a capture with each other and with the rig:
@@ -45,9 +45,9 @@ struct CaptureLooks {
 ///     level_k = sum_b s_kb / sum_b E_kb,  divided by the median over k                        (2)
 ///
 /// * A light that is off has a level below min_level. Two that are on together have one too high.
-/// * Lights that have changed places have the least misfit (LightPatterns) at another light than their
-///   own, as little as other frames at theirs. Patterns are checked where the camera has a pose and
-///   the lights are not distant.
+/// * Lights that have changed places have the least misfit (LightPatterns) at another light than
+///   their own, as little as other frames at theirs. Patterns are checked where the camera has a
+///   pose and the lights are not distant.
 /// * Levels are held to max_level_change where the rig's lights have been calibrated, else to
 ///   max_rough_level_change.
 /// * The last dark frame less the first gives the change of ambient light, the first light's repeat

@@ -28,9 +28,9 @@ namespace sateen {
 // kOtherLight: the frame of `light` is lit from where the rig has `other`.
 [[nodiscard]] CaptureFault OtherLightFault(const Rig& rig, std::size_t light, std::size_t other);
 
-// kShaded, of one light each; kOtherLight where they have changed places, or one is lit as another is,
-// which on cloth that does not lie flat only normals show. `signal`: [light][block], dark subtracted.
-// Shadows that take less than `min_light` of all the light of a frame are left aside.
+// kShaded, of one light each; kOtherLight where they have changed places, or one is lit as another
+// is, which on cloth that does not lie flat only normals show. `signal`: [light][block], dark
+// subtracted. Shadows that take less than `min_light` of all the light of a frame are left aside.
 [[nodiscard]] std::vector<CaptureFault> ShadedFaults(const Rig& rig, const CaptureLooks& looks,
                                                      const std::vector<BlockField>& signal,
                                                      const std::vector<bool>& on,

@@ -27,10 +27,11 @@ struct PixelPlace {
 // Returns the place of the middle's first cell in the picture. [px]
 [[nodiscard]] PixelPlace OriginOfMiddle(ImageSize size_px, ImageSize cells);
 
-/// Adds the middle of a plane, as radiance, to `middle`, which is created if it is empty: cells 2 sites
-/// apart, at most 512 x 512 of them. Each is the mean of 4 x 4 sites with weights 1, 3, 3, 1 along both
-/// axes. These count every colour of a mosaic alike and damp what is finer than the cells, which would
-/// not move with the picture. A cell is not finite where one of its sites is saturated.
+/// Adds the middle of a plane, as radiance, to `middle`, which is created if it is empty: cells 2
+/// sites apart, at most 512 x 512 of them. Each is the mean of 4 x 4 sites with weights 1, 3, 3, 1
+/// along both axes. These count every colour of a mosaic alike and damp what is finer than the
+/// cells, which would not move with the picture. A cell is not finite where one of its sites is
+/// saturated.
 void AddToMiddle(const Image<float>& plane, float saturation, double exposure,
                  Image<float>& middle);
 

@@ -13,8 +13,8 @@ namespace sateen {
 namespace {
 
 constexpr int kFewestTileCells = 32;  // along each side of the picture
-constexpr int kLevels = 4;            // of the pyramid, each half of the one before
-constexpr int kMostSteps = 6;         // of Gauss-Newton on a level
+constexpr int kLevels = 4;            // levels of the pyramid, each half of the one before
+constexpr int kMostSteps = 6;         // steps of Gauss-Newton per level
 constexpr double kSmallCells = 0.01;  // a step that ends a level
 constexpr double kPxOfCell = 2.0;
 

@@ -11,8 +11,8 @@ namespace sateen {
 
 using BlockField = std::vector<double>;  // one value per block of a frame
 
-// e l of a light where a pixel sees the table, summed over colours; zero where the pixel does not see
-// it. Where the camera has no pose, at the table's origin.
+// Returns e l of a light where a pixel sees the table, summed over colours; zero where the pixel
+// does not see it. Where the camera has no pose, it is taken at the table's origin.
 [[nodiscard]] Eigen::Vector3d LightAtPixel(const Rig& rig, const Light& light,
                                            const Eigen::Vector2d& px);
 
@@ -21,9 +21,9 @@ using BlockField = std::vector<double>;  // one value per block of a frame
 ///     q_kb = log s_kb - med_j log s_jb,   r_kb = log E_kb - med_j log E_jb                    (1)
 ///     misfit_kj = var_b (q_kb - r_jb)                                                         (2)
 ///
-/// where s_kb is block b of light k's frame and E_kb the brightness that the rig says. The median over
-/// lights in (1) takes the texture of a fabric out. It runs over the lights that are on, so that
-/// lights that have changed places do not disturb it.
+/// where s_kb is block b of light k's frame and E_kb the brightness that the rig says. The median
+/// over lights in (1) takes the texture of a fabric out. It runs over the lights that are on, so
+/// that lights that have changed places do not disturb it.
 class LightPatterns {
  public:
   // signal, predicted  s and E, [light][block]

@@ -16,10 +16,10 @@ constexpr int kMargin = 2;             // cells that a derivative takes to each 
 constexpr int kTile = 8;               // cells along each side
 constexpr double kLightError = 0.3;    // a of (1), relative to |l|
 constexpr double kMostCells = 1.5;     // longest step: beyond, (1) is no longer linear
-constexpr Eigen::Index kUnknowns = 5;  // of a frame: dx, dy, and a
+constexpr Eigen::Index kUnknowns = 5;  // unknowns per frame: dx, dy, and a
 
-// Of the parabola of fourth order: a difference of two neighbours would be a third too small for a
-// texture of 4 cells, and the steps that much too large.
+// Returns the slope of the parabola of fourth order: a difference of two neighbours would be a
+// third too small for a texture of 4 cells, and the steps that much too large.
 double Slope(float before2, float before, float after, float after2) {
   return (8.0 * static_cast<double>(after - before) - static_cast<double>(after2 - before2)) / 12.0;
 }

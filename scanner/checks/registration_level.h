@@ -22,8 +22,8 @@ class RegistrationLevel {
   // Mean of r of (3) over all cells: how badly the frames fit together at these shifts.
   [[nodiscard]] double Misfit(const std::vector<Eigen::Vector2d>& shifts);
 
-  // The share of the frames' variance that a surface explains, at the shifts of the last Misfit(): 0
-  // where there is only noise.
+  // Returns the share of the frames' variance that a surface explains, at the shifts of the last
+  // Misfit(): 0 where there is only noise.
   [[nodiscard]] double Explained() const { return explained_; }
 
   // Takes one step of Gauss-Newton from `shifts` and writes their standard deviations, of both axes
@@ -67,7 +67,7 @@ class RegistrationLevel {
   std::vector<Image<float>> moved_;
   double scale_ = 1.0;  // s of (3)
   double explained_ = 0.0;
-  // Of the tile that was gathered last, one row per cell.
+  // Values of the tile that was gathered last, one row per cell.
   Matrix v_;
   Matrix regressors_;  // -d/dx of each frame, -d/dy of each, N'
   Matrix pv_;

@@ -20,12 +20,12 @@ constexpr double kAbove = 2.5;
 constexpr int kRobustSteps = 8;
 constexpr double kDarkest = 0.02;     // least brightness of what is predicted that is looked at
 constexpr double kPlaneError = 0.04;  // from the middle to the border, by a wrong position
-constexpr double kNoise = 0.02;       // of a block, for the ridge that holds the plane
-constexpr Eigen::Index kTerms = 9;    // of f: a cubic without its constant
+constexpr double kNoise = 0.02;       // noise of a block, for the ridge that holds the plane
+constexpr Eigen::Index kTerms = 9;    // terms of f: a cubic without its constant
 
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
-// Quantile of the known values; unknown where there is none.
+// Returns the quantile of the known values, or unknown if no value is known.
 double KnownQuantile(std::vector<double> values, double share) {
   std::erase_if(values, [](double v) { return !std::isfinite(v); });
   return values.empty() ? kUnknown : Quantile(std::move(values), share);
@@ -306,8 +306,8 @@ class ShadeFinder {
   double min_depth_;
   size_t count_;
   size_t blocks_;
-  std::vector<double> level_;  // of each light, of what the rig says
-  std::vector<BlockField> y_;  // of (1), then of (2)
+  std::vector<double> level_;  // brightness per light, relative to the rig's
+  std::vector<BlockField> y_;  // y of (1), then z of (2)
 };
 
 }  // namespace

@@ -61,7 +61,7 @@ Correlation ShiftBetween(const Image<float>& first, const Image<float>& second) 
   cv::dft(g, spectrum_g);
   cv::Mat product;
   cv::mulSpectrums(spectrum_g, spectrum_f, product, 0, /*conjB=*/true);
-  cv::Mat correlation;  // of shift (x, y), both modulo the size
+  cv::Mat correlation;  // function of shift (x, y), both modulo the size
   cv::idft(product, correlation, cv::DFT_SCALE | cv::DFT_REAL_OUTPUT);
   double peak = 0.0;
   cv::Point at;

@@ -13,8 +13,8 @@ struct Correlation {
   double peak = 0.0;
 };
 
-/// The highest cross-correlation of both pictures, less their Gaussian blur, over all shifts, and the
-/// top of the parabola through it and its neighbours.
+/// Finds the highest cross-correlation of both pictures, less their Gaussian blur, over all shifts,
+/// and the top of the parabola through it and its neighbours.
 [[nodiscard]] Correlation ShiftBetween(const Image<float>& first, const Image<float>& second);
 
 }  // namespace sateen

@@ -20,7 +20,7 @@ class Histogram {
     ++total_;
   }
 
-  // Of the values, `share` lie at or below this fraction of saturation.
+  // Returns the fraction of saturation at or below which `share` of the values lie.
   [[nodiscard]] double Percentile(double share) const {
     const auto rank = static_cast<int64_t>(share * static_cast<double>(total_));
     int64_t below = 0;
@@ -30,7 +30,7 @@ class Histogram {
         return static_cast<double>(bin) / kBins;
       }
     }
-    return 0.0;  // of nothing
+    return 0.0;  // no values
   }
 
   [[nodiscard]] SignalLevels Levels() const {

@@ -9,8 +9,8 @@
 
 namespace sateen {
 
-// How bright a frame is: percentiles of its sites, each as a fraction of the way from black to where
-// it saturates. Of an image that does not saturate, all are 0.
+// Brightness of a frame: percentiles of its sites, each as a fraction of the way from black to
+// saturation. All are 0 for an image that does not saturate.
 struct SignalLevels {
   double peak = 0.0;       // 99.9th: what is brighter are a few glints
   double low = 0.0;        // 10th: the dark parts that still count

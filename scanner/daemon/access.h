@@ -10,16 +10,16 @@
 
 namespace sateen {
 
-// What of a request decides about whether it is let in. A header that is absent is none, one that is
-// there more than once is all of its values.
+// Headers of a request that decide whether it is let in. An absent header has no values. A repeated
+// header has all of its values.
 struct AccessHeaders {
   std::vector<std::string> host;
   std::vector<std::string> authorization;
   bool has_origin = false;
 };
 
-/// Who is let in over TCP, where any program and any web page of this computer can knock. (On the Unix
-/// socket the file's mode decides.)
+/// Rules for access over TCP, where any program and any web page of this computer can knock. (On
+/// the Unix socket the file's mode decides.)
 ///
 ///     Host     exactly one, localhost, 127.0.0.1 or [::1] with our port; else 421: a name that was
 ///              made to point to this computer is not ours
@@ -43,8 +43,9 @@ class AccessRules {
 
 /// The token: the file's first line.
 ///
-/// Errors  kIo: it cannot be read; kInvalidArgument: others than its owner may read or write it, it is
-///         not the user's own, or the token is not of 16 to 512 printable characters without spaces
+/// Errors  kIo: it cannot be read; kInvalidArgument: others than its owner may read or write it, it
+///         is not the user's own, or the token is not of 16 to 512 printable characters without
+///         spaces
 [[nodiscard]] Result<std::string> ReadTokenFile(const std::filesystem::path& path);
 
 }  // namespace sateen

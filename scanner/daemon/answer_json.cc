@@ -25,7 +25,7 @@ constexpr std::array<std::pair<ErrorCode, std::string_view>, 7> kCodes = {
      {ErrorCode::kTimeout, "timeout"},
      {ErrorCode::kCancelled, "cancelled"}}};
 
-// What a request or a path said is echoed in messages, and need not be UTF-8.
+// Writes JSON as one line. Messages echo requests and paths, which need not be UTF-8.
 std::string OneLine(const ordered_json& json) {
   return json.dump(-1, ' ', false, ordered_json::error_handler_t::replace);
 }
@@ -40,7 +40,7 @@ std::string TimeText(system_clock::time_point time) {
   return {text.data(), size};
 }
 
-// What the daemon said was JSON of ours, or is none of ours: then it is kept as it is.
+// Parses the daemon's JSON. Text that is not JSON is kept as a string.
 ordered_json Embedded(const std::string& text) {
   ordered_json json = ordered_json::parse(text, nullptr, /*allow_exceptions=*/false);
   return json.is_discarded() ? ordered_json(text) : json;

@@ -14,7 +14,7 @@
 #include "scanner/daemon/light_job.h"
 #include "scanner/daemon/rig_service.h"
 
-// What the daemon answers, as JSON and back; docs/api.md has the keys. Texts are one line.
+// Answers of the daemon, to JSON and back; docs/api.md has the keys. Texts are one line.
 namespace sateen {
 
 [[nodiscard]] std::string StateJson(const RigState& state, const std::string& version);

@@ -22,7 +22,7 @@ std::optional<T> WholeNumber(const std::string& text) {
   return whole ? std::optional(number) : std::nullopt;
 }
 
-// Who has a job: the name that a client gives itself, and what the transport knows of it.
+// Returns the owner of a job: the name that a client gives itself, and what the transport knows.
 std::string OwnerName(const std::string& client, const std::string& who) {
   return client.empty() ? who : fmt::format("{} ({})", client, who);
 }
@@ -166,7 +166,7 @@ ApiResponse Api::GetJobs(const ApiRequest& /*request*/, Parameter /*none*/) cons
 }
 
 std::optional<ApiResponse> Api::CannotBegin(const Status& checked) const {
-  // Who has the rig matters more, and is the answer of Begin().
+  // A job that has the rig matters more, and Begin() answers with it.
   return checked || service_.State().job ? std::nullopt
                                          : std::optional(RefusedUnbegun(checked.error()));
 }

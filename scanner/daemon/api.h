@@ -14,12 +14,12 @@ struct ApiRequest {
   std::string method;
   std::string path;  // decoded, without a query
   std::string body;
-  std::string who;                             // as the transport knows the client
-  std::optional<std::uint64_t> last_event_id;  // of Last-Event-ID
+  std::string who;                             // client as the transport knows it
+  std::optional<std::uint64_t> last_event_id;  // value of Last-Event-ID
 };
 
 struct ApiResponse {
-  // What the transport sends instead of a body: the events of a job as they come.
+  // Events of a job, which the transport sends as they come instead of a body.
   struct Events {
     std::uint64_t job = 0;
     std::uint64_t after = 0;
@@ -34,20 +34,20 @@ struct ApiResponse {
 
 // The answer to a refused request: the status, and an error in JSON.
 [[nodiscard]] ApiResponse Refused(int status, const Error& error);
-// 400, 422, 500, 503 or 504.
+// Returns 400, 422, 500, 503 or 504.
 [[nodiscard]] int HttpStatus(ErrorCode code);
-// Of what a request names and a job could not begin with: 400, or 422 where it is a file.
+// Returns the answer for an argument with which no job could begin: 400, or 422 for a file.
 [[nodiscard]] ApiResponse RefusedUnbegun(const Error& error);
 
 struct ApiOptions {
   std::string version;
-  CaptureOptions capture;  // of a capture, what its request does not say
+  CaptureOptions capture;  // defaults for what a capture request does not say
   // How long turning the lights off waits for the job that it has cancelled.
   std::chrono::milliseconds off_wait{10'000};
 };
 
-/// The daemon's interface, version 1, as a function of a request: docs/api.md. Calls may come from any
-/// thread; those that ask a device wait for it.
+/// The daemon's interface, version 1, as a function of a request: docs/api.md. Calls may come from
+/// any thread; those that ask a device wait for it.
 class Api {
  public:
   Api(RigService& service, ApiOptions options);
@@ -57,7 +57,7 @@ class Api {
  private:
   struct Route;
   static const std::vector<Route>& Routes();
-  using Parameter = const std::string&;  // what stands in a route's place {}
+  using Parameter = const std::string&;  // value of a route's place {}
 
   [[nodiscard]] ApiResponse GetState(const ApiRequest& request, Parameter none) const;
   [[nodiscard]] ApiResponse GetDevices(const ApiRequest& request, Parameter none) const;
@@ -74,7 +74,7 @@ class Api {
 
   [[nodiscard]] ApiResponse PostPreviewJob(const ApiRequest& request) const;
   [[nodiscard]] ApiResponse PostSolveJob(const ApiRequest& request) const;
-  // What the job would end with at once; nothing where it may begin or another has the rig.
+  // Returns the job's immediate error. Returns nothing if it may begin or another job has the rig.
   [[nodiscard]] std::optional<ApiResponse> CannotBegin(const Status& checked) const;
   [[nodiscard]] ApiResponse Begin(JobRequest job) const;     // 202, or 409
   [[nodiscard]] ApiResponse RunToEnd(JobRequest job) const;  // 200, 409, or the job's error

@@ -9,9 +9,9 @@
 #include "scanner/daemon/board_job.h"
 #include "scanner/daemon/light_job.h"
 
-// What the daemon is asked, as JSON and back; docs/api.md has the keys. A key that a request shall have
-// is added to its two functions here. Readers are strict: an unknown key, a wrong type and a value out
-// of range are each a kInvalidArgument that names the key.
+// Requests to the daemon, to JSON and back; docs/api.md has the keys. To give a request a new key,
+// add it to its two functions here. Readers are strict: an unknown key, a wrong type and a value
+// out of range are each a kInvalidArgument that names the key.
 namespace sateen {
 
 // `client`, in all of them, is who asks, as it calls itself; empty where it does not say.
@@ -22,7 +22,7 @@ struct PostedCapture {
 };
 // "capture", "preview" or "solve"; empty where the text does not say.
 [[nodiscard]] std::string KindOfJob(const std::string& text);
-// What the text does not say is as in `defaults`.
+// Reads a capture request. Absent keys are as in `defaults`.
 [[nodiscard]] Result<PostedCapture> CaptureFromJson(const std::string& text,
                                                     const CaptureOptions& defaults);
 [[nodiscard]] std::string CaptureToJson(const CaptureRequest& request, const std::string& client,

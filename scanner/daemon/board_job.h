@@ -10,17 +10,17 @@
 
 namespace sateen {
 
-// What a board says about itself when it is asked.
+// A board's description of itself.
 struct BoardWord {
   std::string port;
   BoardInfo info;
   BoardReport report;
 };
 
-// What of a board's settings shall change; what is absent stays. All of it turns all lights off.
+// Changes to a board's settings. Absent ones stay. Any change turns all lights off.
 struct BoardChange {
   bool clear_fault = false;
-  std::optional<int> channel;  // of max_level and max_on; absent: all
+  std::optional<int> channel;  // channel for max_level and max_on; absent: all
   std::optional<double> max_level;
   std::optional<std::chrono::milliseconds> max_on;
   std::optional<int> max_lit;

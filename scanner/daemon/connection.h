@@ -9,8 +9,8 @@
 namespace sateen {
 
 struct ConnectionLimits {
-  // The whole request, however slowly it comes; and each piece of the answer that the client does not
-  // take.
+  // The whole request, however slowly it comes; and each piece of the answer that the client does
+  // not take.
   std::chrono::milliseconds read{10'000};
   std::chrono::milliseconds write{10'000};
   // Request line, headers and body together.
@@ -24,7 +24,8 @@ class Connection {
   Connection(int fd, const ConnectionLimits& limits);
   Connection(const Connection&) = delete;
   Connection& operator=(const Connection&) = delete;
-  // Ends the connection so that the client can read the answer: reads what it still sends, for a moment.
+  // Ends the connection so that the client can read the answer: reads for a moment what it
+  // still sends.
   ~Connection();
 
   // Appends the next bytes to `into`. Returns false at the end, the deadline or the limit.

@@ -14,17 +14,17 @@ namespace sateen {
 // A serial port or a camera, and what it said when it was asked.
 struct DeviceReply {
   std::string port;
-  std::string usb;  // of a serial port: "2341:0043"; empty: not on USB
+  std::string usb;  // USB id of a serial port: "2341:0043"; empty: not on USB
   std::string description;
-  std::string serial;  // of a serial port
+  std::string serial;  // serial number of a serial port
   bool is_camera = false;
-  bool answers = false;  // it is an LED board, or a camera that is ready
-  std::string what;      // what it said, or why it is taken for none
-  // Of an LED board that answers.
+  bool answers = false;  // whether it is an LED board, or a camera that is ready
+  std::string what;      // its answer, or why it is taken for none
+  // Fields of an LED board that answers.
   std::string firmware;
   std::string protocol;
   int lights = 0;
-  // Of a camera that is ready.
+  // Fields of a camera that is ready.
   std::string model;
   std::string profile;
 };

@@ -19,7 +19,7 @@ class EventParser {
   void TakeLine(std::string_view line);
 
   std::function<void(const JobEvent&)> take_;
-  std::string line_;  // what has come of it
+  std::string line_;  // part of the line that has come
   JobEvent event_;
 };
 

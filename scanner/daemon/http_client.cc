@@ -24,14 +24,14 @@ using std::chrono::seconds;
 constexpr seconds kPatience{120};
 // For the first word of a daemon that is there.
 constexpr seconds kGreeting{5};
-// Of a stream of events, whose daemon says every 5 s that it is there.
+// Silence allowed in a stream of events. The daemon sends a sign of life every 5 s.
 constexpr seconds kSilence{30};
 // How soon Ctrl-C is heard.
 constexpr milliseconds kStep{20};
 // How often a stream that breaks off is taken up again without having brought anything new.
 constexpr int kResumes = 5;
 
-// Distinguishes a daemon that is slow from one that has died: one that has died accepts nobody any more.
+// Distinguishes a slow daemon from one that has died, which accepts no more connections.
 Error NoAnswer(const std::filesystem::path& socket, const ExchangeFault& fault) {
   const bool slow = fault.while_reading && Accepts(socket);
   return {slow ? ErrorCode::kTimeout : ErrorCode::kDevice,

@@ -18,9 +18,9 @@ namespace sateen {
 
 /// The daemon at the other end of a Unix socket. Each call is a connection of its own.
 ///
-/// Errors  what the daemon answers, with its code and message, so that a caller ends with the same exit
-///         status as without a daemon; kDevice: another job has the rig (who, and since when), or the
-///         daemon has gone; kTimeout: it does not answer
+/// Errors  what the daemon answers, with its code and message, so that a caller ends with the same
+///         exit status as without a daemon; kDevice: another job has the rig (who, and since when),
+///         or the daemon has gone; kTimeout: it does not answer
 class DaemonClient {
  public:
   explicit DaemonClient(std::filesystem::path socket);
@@ -29,8 +29,8 @@ class DaemonClient {
   [[nodiscard]] Result<std::string> Ask(const std::string& method, const std::string& path,
                                         const std::string& body = "") const;
 
-  // Posts the job, tells `observer` of its progress, cancels it when the task is cancelled, and waits
-  // for its end; its result.
+  // Posts the job, tells `observer` of its progress, cancels it when the task is cancelled, and
+  // waits for its end; its result.
   [[nodiscard]] Result<std::string> RunJob(const std::string& path, const std::string& body,
                                            const std::function<void(const JobEvent&)>& observer,
                                            const Task& task) const;
@@ -41,9 +41,9 @@ class DaemonClient {
   std::filesystem::path socket_;
 };
 
-/// The daemon that is running, if one is: at $SATEEN_SOCKET where that is set, and where it is empty
-/// none; else at $XDG_RUNTIME_DIR/sateen.sock, else at /run/sateen/sateen.sock. A socket at which nobody
-/// answers, or to which the user may not connect, is no daemon.
+/// The daemon that is running, if one is: at $SATEEN_SOCKET where that is set, and where it is
+/// empty none; else at $XDG_RUNTIME_DIR/sateen.sock, else at /run/sateen/sateen.sock. A socket at
+/// which nobody answers, or to which the user may not connect, is no daemon.
 ///
 /// Errors  kTimeout, kBadData: something answers there, but not as a daemon does
 [[nodiscard]] Result<std::optional<DaemonClient>> FindDaemon();

@@ -27,7 +27,8 @@ struct HttpRequest {
   [[nodiscard]] std::optional<std::string> FirstOf(std::string_view name) const;
 };
 
-/// Returns the bytes up to and including the empty line that ends a head; nothing while it is missing.
+/// Returns the number of bytes up to and including the empty line that ends a head; nothing while
+/// it is missing.
 [[nodiscard]] std::optional<std::size_t> HeadSize(std::string_view bytes);
 
 /// Parses a whole head, up to and including its empty line.

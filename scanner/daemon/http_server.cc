@@ -34,7 +34,7 @@ void RefuseBusy(int fd) {
       "HTTP/1.1 503 Service Unavailable\r\nContent-Type: application/json\r\nContent-Length: {}\r\n"
       "Connection: close\r\n\r\n{}",
       body.size(), body);
-  std::array<char, 4096> unread = {};  // what stays unread takes the answer away
+  std::array<char, 4096> unread = {};  // unread bytes would make the client lose the answer
   [[maybe_unused]] ssize_t ignored = recv(fd, unread.data(), unread.size(), MSG_DONTWAIT);
   ignored = send(fd, answer.data(), answer.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
   close(fd);

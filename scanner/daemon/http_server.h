@@ -21,18 +21,19 @@ struct HttpServerOptions {
   std::chrono::milliseconds heartbeat{5000};
   std::size_t max_body_bytes = std::size_t{64} * 1024;
   int max_connections = 64;  // each has a thread; the next one is told 503
-  int max_streams = 16;      // of them, those that follow events
+  int max_streams = 16;      // connections among them that follow events
 };
 
-/// The API over HTTP/1.1 on one listener, one request per connection. Boost.Beast parses what comes;
-/// sockets, deadlines and limits are here.
+/// The API over HTTP/1.1 on one listener, one request per connection. Boost.Beast parses what
+/// comes; sockets, deadlines and limits are here.
 ///
-/// 400 no HTTP or no valid Content-Length, 401, 403, 421 (AccessRules), 408 too slow, 411 a body without
-/// Content-Length, 413 too long a body, 414 too long a path, 415 a body that is no application/json,
-/// 503 too many clients; everything else is the Api's answer.
+/// 400 no HTTP or no valid Content-Length, 401, 403, 421 (AccessRules), 408 too slow, 411 a body
+/// without Content-Length, 413 too long a body, 414 too long a path, 415 a body that is no
+/// application/json, 503 too many clients; everything else is the Api's answer.
 class HttpServer {
  public:
-  // Without `access` everybody who can connect is let in. `api` and `service` must outlive the server.
+  // Lets in everybody who can connect if there is no `access`. `api` and `service` must outlive the
+  // server.
   HttpServer(Listener listener, const Api& api, const RigService& service,
              std::optional<AccessRules> access, const HttpServerOptions& options = {});
   HttpServer(const HttpServer&) = delete;

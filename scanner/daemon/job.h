@@ -13,7 +13,7 @@
 
 namespace sateen {
 
-// What happened to a job, in its order. A job ends with one "done" or one "failed".
+// Event of a job. Events are in order, and a job ends with one "done" or one "failed".
 struct JobEvent {
   std::uint64_t sequence = 0;  // from 1, without gaps
   std::string type;            // "progress", "done", "failed"
@@ -22,17 +22,17 @@ struct JobEvent {
 
 enum class JobState { kRunning, kDone, kFailed };
 
-// Who asks for something, in words that tell another person whom to talk to.
+// Record of a job. `owner` tells another person whom to talk to.
 struct JobRecord {
   std::uint64_t id = 0;
   std::string kind;   // "capture", "light", "devices", "board", "lights off", "solve"
   std::string what;   // the folder of a capture, the light
-  std::string owner;  // who asked: "process 4711 (sateen) of alice"
+  std::string owner;  // client that asked: "process 4711 (sateen) of alice"
   std::chrono::system_clock::time_point since;
   std::optional<std::chrono::system_clock::time_point> ended;
   JobState state = JobState::kRunning;
-  std::string result;          // JSON, of a job that is done
-  std::optional<Error> error;  // of one that failed; kCancelled: somebody cancelled it
+  std::string result;          // JSON; only of a job that is done
+  std::optional<Error> error;  // error of a failed job; kCancelled: somebody cancelled it
   std::uint64_t last_event = 0;
   bool has_rig = true;  // whether it has board and camera to itself
 };
@@ -50,7 +50,8 @@ class JobContext {
   virtual void Lit(std::vector<int> channels) = 0;
 };
 
-// Does the job and returns its result as JSON. It stops with kCancelled soon after the task's flag is set.
+// Does the job and returns its result as JSON. Stops with kCancelled soon after the task's flag is
+// set.
 using JobWork = std::function<Result<std::string>(JobContext&)>;
 
 struct JobRequest {

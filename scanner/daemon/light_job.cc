@@ -10,7 +10,7 @@ constexpr milliseconds kKeepAlive{250};
 // How soon a cancelled task is noticed.
 constexpr milliseconds kCancelStep{50};
 
-// What the light did until it went off, by itself or because the task was cancelled.
+// Record of a light until it went off, by itself or because the task was cancelled.
 struct Lit {
   bool cancelled = false;
   milliseconds lasted{0};  // as the board last said

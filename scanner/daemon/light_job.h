@@ -14,24 +14,24 @@ namespace sateen {
 // One light, on for a while.
 struct LightRequest {
   int channel = 0;
-  std::string name;    // what messages call it; empty: its channel
+  std::string name;    // name in messages; empty: its channel
   double level = 0.5;  // [0, 1]; 0: off
   std::optional<std::chrono::milliseconds>
       on_time;  // absent: until cancelled, or the board's limit
 };
 
-// What the board made of it.
+// The board's settings for the request.
 struct LightOn {
   double level = 0.0;
-  std::chrono::milliseconds on_time{0};  // after which it goes off by itself
+  std::chrono::milliseconds on_time{0};  // time after which it goes off by itself
 };
 
 /// Turns the light on and stays with it, since the board turns off when it hears nothing, until it
-/// goes off or the task is cancelled; then the light is off. `began` is told once it is on; of level 0
-/// it is not called.
+/// goes off or the task is cancelled; then the light is off. `began` is told once it is on; of
+/// level 0 it is not called.
 ///
-/// Errors   kDevice: a fault of the board; the light's limit came before anybody cancelled, where no
-///          time was asked for; kInvalidArgument, kTimeout as LightBoard
+/// Errors   kDevice: a fault of the board; the light's limit came before anybody cancelled, where
+///          no time was asked for; kInvalidArgument, kTimeout as LightBoard
 /// Returns  whether it was cancelled
 [[nodiscard]] Result<bool> KeepLightOn(const LightRequest& request, LightBoard& board,
                                        const Task& task,

@@ -10,11 +10,12 @@ namespace sateen {
 // A socket that waits for connections, on this computer only. Owns its descriptor and its file.
 class Listener {
  public:
-  /// On a Unix socket that only its owner, and root, may connect to: the file is made with mode 0600.
-  /// A file `path`.lock is locked for as long as this lives, so that of two daemons that start at once
-  /// one wins; the socket that a killed daemon left is replaced.
+  /// On a Unix socket that only its owner, and root, may connect to: the file is made with mode
+  /// 0600. A file `path`.lock is locked for as long as this lives, so that of two daemons that
+  /// start at once one wins; the socket that a killed daemon left is replaced.
   ///
-  /// Errors  kDevice: a daemon has this socket; kIo: something else is there, or the system refuses;
+  /// Errors  kDevice: a daemon has this socket; kIo: something else is there, or the system
+  ///         refuses;
   ///         kInvalidArgument: longer than the system's 107 bytes
   [[nodiscard]] static Result<Listener> OnUnixSocket(const std::filesystem::path& path);
   /// "127.0.0.1:8377", "localhost:8377" or "[::1]:8377"; port 0 takes a free one.
@@ -38,7 +39,7 @@ class Listener {
   int fd_ = -1;
   int lock_ = -1;
   int port_ = 0;
-  std::filesystem::path path_;  // of a Unix socket
+  std::filesystem::path path_;  // path of a Unix socket
   std::string name_;
 };
 

@@ -10,7 +10,7 @@
 #include "scanner/daemon/job.h"
 #include "scanner/daemon/light_job.h"
 
-// What the daemon does when it is asked: each makes one job of a request.
+// Work of the daemon: each function makes one job from a request.
 namespace sateen {
 
 // Result: SummaryJson. Progress: EventJson.

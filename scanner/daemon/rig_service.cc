@@ -200,7 +200,7 @@ Result<std::string> RigService::Work(Job& job) {
   Context context(*this, job);
   // Nothing that a job does may end the daemon, or leave its lights on.
   try {
-    const JobWork work = std::exchange(job.work, nullptr);  // what it holds goes with the job
+    const JobWork work = std::exchange(job.work, nullptr);  // released with the job
     return work(context);
   } catch (const std::exception& error) {
     return Fail(ErrorCode::kIo, "internal error in a job: {}", error.what());

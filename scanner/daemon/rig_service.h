@@ -55,14 +55,14 @@ struct FollowedEvents {
 ///     ending     the board has said that all lights are off, or cannot be
 ///                reached twice, which takes longer than its 2 s of silence     -> idle
 ///
-/// A job counts as running until its lights are off, so that no light is ever on while the state says
-/// that no job runs. Begin while a job runs is refused at once with who has the rig since when; there
-/// is no queue. All calls may come from any thread.
+/// A job counts as running until its lights are off, so that no light is ever on while the state
+/// says that no job runs. Begin while a job runs is refused at once: the error names who has the
+/// rig and since when. There is no queue. All calls may come from any thread.
 ///
 /// A job that needs no devices, as a solve, runs in a thread of its own beside the job that has the
 /// rig: neither waits for the other. There is one such job at a time.
 ///
-/// Of each job the latest 1000 events are kept, and of ended jobs the latest 20.
+/// The latest 1000 events of each job are kept, and the latest 20 ended jobs.
 class RigService {
  public:
   explicit RigService(std::unique_ptr<RigDevices> devices);
@@ -89,8 +89,8 @@ class RigService {
   // Waits until no job has the rig; false where one still does after `longest`.
   bool WaitIdle(std::chrono::milliseconds longest) const;
 
-  // Refuses new jobs, cancels the running ones, waits for their end, turns all lights off and closes the
-  // devices. The second time it does nothing.
+  // Refuses new jobs, cancels the running ones, waits for their end, turns all lights off and
+  // closes the devices. The second time it does nothing.
   void Stop();
 
  private:
@@ -119,7 +119,7 @@ class RigService {
   void Append(Job& job, std::string type, std::string data);  // with the mutex held
   [[nodiscard]] Job* Known(std::uint64_t id) const;           // with the mutex held
 
-  std::unique_ptr<RigDevices> devices_;  // of the rig's thread alone
+  std::unique_ptr<RigDevices> devices_;  // used by the rig's thread alone
 
   mutable std::mutex mutex_;  // for all below
   mutable std::condition_variable changed_;
@@ -131,7 +131,7 @@ class RigService {
   std::string lights_fault_;
   bool stopping_ = false;
   Lane rig_;
-  Lane desk_;  // of jobs without devices
+  Lane desk_;  // lane of jobs without devices
 };
 
 }  // namespace sateen

@@ -20,8 +20,8 @@ struct ExchangePatience {
   std::chrono::milliseconds silence{120'000};  // between two pieces of the answer
 };
 
-/// Sends one HTTP request to the server on a Unix socket and gives the pieces of the answer's body, with
-/// its status, to `take` as they come. Returns the status.
+/// Sends one HTTP request to the server on a Unix socket and gives the pieces of the answer's body,
+/// with its status, to `take` as they come. Returns the status.
 [[nodiscard]] tl::expected<int, ExchangeFault> ExchangeOnUnixSocket(
     const std::filesystem::path& socket, std::string_view request, const ExchangePatience& patience,
     const std::function<void(int status, std::string_view piece)>& take);

@@ -13,7 +13,7 @@
 
 namespace sateen {
 
-// What the table of messages says of each message, for templates: id, size, answer, pack, unpack.
+// Facts of each message from the table, for templates: id, size, answer, pack, unpack.
 template <typename Fields>
 struct BoardMessage;
 
@@ -33,8 +33,8 @@ SATEEN_ANSWERS(SATEEN_BOARD_MESSAGE)
 #undef SATEEN_BOARD_REQUEST
 #undef SATEEN_BOARD_MESSAGE
 
-// Frames over a port: sequence numbers, time-outs, sending again, and the states of LightBoard, whose
-// header describes them.
+// Frames over a port: sequence numbers, time-outs, sending again, and the states of LightBoard,
+// whose header describes them.
 class BoardLink {
  public:
   BoardLink(std::unique_ptr<BytePort> port, const LightBoardOptions& options);

@@ -11,7 +11,8 @@
 namespace sateen {
 
 // A serial port as the LED board's link sees it: bytes, and the clock by which they are waited for.
-// SerialPort is the real one; tests put their own in its place, with faults and with simulated time.
+// SerialPort is the real one; tests put their own in its place, with faults and with simulated
+// time.
 class BytePort {
  public:
   using Duration = std::chrono::microseconds;
@@ -21,7 +22,7 @@ class BytePort {
   BytePort& operator=(const BytePort&) = delete;
   virtual ~BytePort() = default;
 
-  // What people call it: "/dev/ttyACM0".
+  // Returns the name that people use: "/dev/ttyACM0".
   [[nodiscard]] virtual std::string Name() const = 0;
 
   // Opens it, with nothing waiting to be read; also after Close() and after it was lost.

@@ -7,7 +7,7 @@
 
 namespace sateen {
 
-// What a camera has to be set to before a capture, or what to tell a person where it cannot be set.
+// A setting that a camera needs before a capture, or what to tell a person where it cannot be set.
 struct RequiredSetting {
   std::vector<std::string> names;   // libgphoto2's, the first that the camera has
   std::vector<std::string> values;  // any of these; the first that the camera offers is set
@@ -28,8 +28,8 @@ struct CameraProfile {
 // The profile for what the camera says of itself; "generic" where no other fits.
 [[nodiscard]] const CameraProfile& ProfileFor(std::string_view manufacturer);
 
-// The number that a camera's word for a setting means: "1/60", "0.0166s", "13/10", "f/8", "5.6", "400".
-// Nothing for "bulb", "Auto" and the like.
+// Returns the number that a camera's word for a setting means: "1/60", "0.0166s", "13/10", "f/8",
+// "5.6", "400". Returns nothing for "bulb", "Auto" and the like.
 [[nodiscard]] std::optional<double> SettingValue(std::string_view word);
 
 // One setting of a camera is taken for another where they differ by less than this, relatively: a

@@ -17,27 +17,28 @@ struct FolderCameraOptions {
   std::chrono::milliseconds quiet{500};
   // How often the folder is looked at; at least 1 ms.
   std::chrono::milliseconds interval{50};
-  // Waits between two looks; absent: sleeps. Deadlines count these waits, so that a test that puts its
-  // own here decides what happens when.
+  // Waits between two looks; absent: sleeps. Deadlines count these waits, so that a test that puts
+  // its own here decides what happens when.
   std::function<void(std::chrono::milliseconds)> wait;
 
   [[nodiscard]] Status Validate() const;
 };
 
-/// A camera that this computer does not speak to: another program, or a card with a radio, drops its
-/// RAW files into a folder. Whoever releases it (the LED board's shutter output, or a hand) does so
-/// while Capture() waits.
+/// A camera that this computer does not speak to: another program, or a card with a radio, drops
+/// its RAW files into a folder. Whoever releases it (the LED board's shutter output, or a hand)
+/// does so while Capture() waits.
 ///
-/// A frame is the one RAW file that appears in that time, keeps its size for `quiet` and decodes. It is
-/// copied; the folder is left as it is. Files that were there before, at Open() or between two frames,
-/// are no frame of ours and are left alone; LeftAlone() names them, and so does the error where no
-/// other comes. Each file is taken once. Files that are not RAW by their name are not looked at.
+/// A frame is the one RAW file that appears in that time, keeps its size for `quiet` and decodes.
+/// It is copied; the folder is left as it is. Files that were there before, at Open() or between
+/// two frames, are no frame of ours and are left alone; LeftAlone() names them, and so does the
+/// error where no other comes. Each file is taken once. Files that are not RAW by their name are
+/// not looked at.
 ///
-/// Settings cannot be set: Configure() keeps them, and a file that says it was exposed otherwise is an
-/// error.
+/// Settings cannot be set: Configure() keeps them, and a file that says it was exposed otherwise is
+/// an error.
 ///
-/// Errors of Capture() beside those of the interface: kDevice: two new files; kBadData: the new file
-/// does not decode until the deadline.
+/// Errors of Capture() beside those of the interface: kDevice: two new files; kBadData: the new
+/// file does not decode until the deadline.
 class FolderCamera : public TetheredCamera {
  public:
   explicit FolderCamera(FolderCameraOptions options);

@@ -7,8 +7,8 @@
 
 namespace sateen {
 
-// An error as the worker reports it, in words with what to do: of libgphoto2, {"code", "text", "while"}, a
-// kDevice; of this computer's disk, {"errno", "path"}, a kIo.
+// An error as the worker reports it, in words with what to do: of libgphoto2, {"code", "text",
+// "while"}, a kDevice; of this computer's disk, {"errno", "path"}, a kIo.
 [[nodiscard]] Error FromLibrary(const nlohmann::json& error, const std::string& port);
 
 // Also where it may be gone: a connection that broke is kUnspecified as often as not.

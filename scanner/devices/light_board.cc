@@ -25,7 +25,7 @@ std::string ResetText(unsigned causes) {
   return text.empty() ? "unknown: the bootloader does not say" : text;
 }
 
-// Of a SateenState, or of a SateenReport, which begins with the same fields.
+// Returns the state from a SateenState, or from a SateenReport, which begins with the same fields.
 template <typename Answer>
 BoardState StateOf(const Answer& answer) {
   return {.fault = answer.fault,

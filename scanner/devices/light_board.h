@@ -13,7 +13,7 @@ namespace sateen {
 
 class BoardLink;
 
-// What one light may do; the board enforces it.
+// Limits of one light. The board enforces them.
 struct LightLimits {
   double max_level = 1.0;  // [0, 1]
   std::chrono::milliseconds max_on{0};
@@ -26,7 +26,7 @@ struct BoardSettings {
   bool sync_rising = false;
 };
 
-// What the board said about itself in its greeting.
+// The board's description of itself in its greeting.
 struct BoardInfo {
   std::string protocol;  // "1.0"
   std::string build_id;
@@ -37,11 +37,11 @@ struct BoardInfo {
   std::vector<LightLimits> lights;  // one for each channel
 };
 
-// What the outputs did when the board answered.
+// State of the outputs when the board answered.
 struct BoardState {
   int fault = 0;       // the latest that was not cleared; FaultText() has the words
   unsigned lit = 0;    // bit k: light k is on
-  double level = 0.0;  // of the lights that are on, [0, 1]
+  double level = 0.0;  // level of the lights that are on, [0, 1]
   std::chrono::milliseconds lit_for{0};  // since the first of them went on
   std::chrono::milliseconds left{0};     // until the first of them goes off
   int armed = -1;                        // the light that waits for the flash sync, or -1
@@ -64,7 +64,7 @@ struct BoardReport {
   unsigned faults = 0;
 };
 
-// What the number means, in words.
+// Returns the meaning of the number in words.
 [[nodiscard]] std::string FaultText(int fault);
 
 struct LightBoardOptions {
@@ -84,15 +84,15 @@ struct LightBoardOptions {
 ///     kClosed      Connect              -> kReady; an error leaves it kClosed
 ///     kReady       everything           the port is lost, or no answer after all tries -> kLost
 ///                                       a greeting that was not asked for, or "not greeted" from
-///                                       the board: it has restarted, all is off       -> kRestarted
+///                                       the board: it has restarted, all is off      -> kRestarted
 ///                                       Close -> kClosed
 ///     kLost        Connect, Close       Connect opens the port anew                     -> kReady
 ///     kRestarted   Connect, Close       Connect greets on the open port                 -> kReady
 ///
-/// Connect says hello, on which the board turns everything off, so kReady begins with all lights off.
-/// In other states than kReady commands send nothing and fail with kDevice, so that nobody believes
-/// a light to be on that went off with the board. A command that the board refuses is an error and
-/// changes nothing; the state stays kReady.
+/// Connect says hello, on which the board turns everything off, so kReady begins with all lights
+/// off. In other states than kReady commands send nothing and fail with kDevice, so that nobody
+/// believes a light to be on that went off with the board. A command that the board refuses is an
+/// error and changes nothing; the state stays kReady.
 ///
 /// A command is sent again, as the very same frame, where no answer or "bad frame" comes; the board
 /// executes it once. Its answer is the state after it. Bytes that are no frame are skipped, answers
@@ -103,8 +103,8 @@ struct LightBoardOptions {
 /// nothing, and the board's own time-out does it.
 ///
 /// Errors   kDevice: the port is gone, the board restarted, refused, or speaks another protocol
-///          kTimeout: no answer after all tries; what the board does then is not known, but it turns
-///          everything off within 2 s
+///          kTimeout: no answer after all tries; what the board does then is not known, but it
+///          turns everything off within 2 s
 ///          kInvalidArgument: a value out of its range or above the light's limit; nothing was sent
 /// Cost     set light at 500 kbaud: 15 bytes there, 22 back, 0.74 ms on the wire
 class LightBoard {
@@ -118,11 +118,12 @@ class LightBoard {
 
   [[nodiscard]] State state() const;
   [[nodiscard]] std::string PortName() const;
-  // Of the last Connect that succeeded.
+  // Returns the information from the last Connect that succeeded.
   [[nodiscard]] const BoardInfo& Info() const;
 
-  // Tries until the board has greeted or greeting_timeout has passed. From kClosed a port that is not
-  // there is an error at once; from other states it is waited for, since it may be plugged in again.
+  // Tries until the board has greeted or greeting_timeout has passed. From kClosed a port that is
+  // not there is an error at once; from other states it is waited for, since it may be plugged in
+  // again.
   [[nodiscard]] Status Connect();
   // Sends all off where the state is kReady, without waiting for the answer.
   void Close() noexcept;

@@ -216,7 +216,7 @@ Status PtpCamera::Require(const RequiredSetting& required) {
               info_.port, setting.name, setting.value, required.what, required.remedy);
 }
 
-// What the camera has afterwards; nothing where it does not say.
+// Sets the number. Returns the number that the camera has afterwards; nothing if it does not say.
 Result<std::optional<double>> PtpCamera::SetNumber(const std::vector<std::string>& names,
                                                    double wanted, const char* what) {
   auto found = Find(names);

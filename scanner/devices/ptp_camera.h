@@ -16,7 +16,7 @@ namespace sateen {
 struct PtpCameraOptions {
   // libgphoto2's name: "usb:001,004", "ptpip:192.168.1.1". Empty: the only camera that is found.
   std::string port;
-  // What talks to the camera; empty: WorkerProcess::DefaultProgram().
+  // Program that talks to the camera; empty: WorkerProcess::DefaultProgram().
   std::filesystem::path worker;
   // Longest wait for the answer to one call; at least 1 ms. Connecting may take four times as long.
   std::chrono::milliseconds answer_timeout{5000};
@@ -45,15 +45,16 @@ struct FoundCamera {
 ///                                                Close -> kClosed
 ///     kLost     Open, Close                      Open begins with a new process      -> kOpen
 ///
-/// A camera that refuses (a setting, a full card, busy to the end of the deadline) stays kOpen, and so
-/// does one whose file finds no room on this computer's disk; the file stays on its card then. The connection stays up from Open to Close.
+/// A camera that refuses (a setting, a full card, busy to the end of the deadline) stays kOpen, and
+/// so does one whose file finds no room on this computer's disk; the file stays on its card then.
+/// The connection stays up from Open to Close.
 ///
 /// A frame is a file that the camera announces after the shutter was released and not before the
 /// exposure can be over; what is announced earlier is left over from a capture that was given up. A
 /// second file of the same frame is an error. The file is downloaded to a hidden name in `folder`,
-/// counts when it has the size that the camera says, decodes as RAW and was exposed as set, then gets
-/// its place and is deleted from the camera; a download that ends too early is tried once more.
-/// Nothing is flushed to the disk.
+/// counts when it has the size that the camera says, decodes as RAW and was exposed as set, then
+/// gets its place and is deleted from the camera; a download that ends too early is tried once
+/// more. Nothing is flushed to the disk.
 class PtpCamera : public TetheredCamera {
  public:
   enum class State { kClosed, kOpen, kLost };

@@ -38,7 +38,7 @@ class RigDevices {
   [[nodiscard]] Result<TetheredCamera*> Camera();
   // So that Camera() opens it anew: after an error that may have been its own.
   void CloseCamera() noexcept;
-  // What the camera said when it was opened; nothing where it is not open.
+  // Returns the camera's answer on opening; nothing where it is not open.
   [[nodiscard]] const std::optional<CameraInfo>& OpenCamera() const { return camera_info_; }
 
   // All lights off, where there is a board that answers. kDevice, kTimeout: it does not, and turns

@@ -32,7 +32,7 @@ bool MayBeBoard(const SerialPortInfo::UsbId& usb) {
 
 std::string OrEmpty(const char* text) { return text == nullptr ? std::string() : text; }
 
-// What the system says of the call that has just failed.
+// Returns the system's words for the call that has just failed.
 std::string LastError(sp_return code) {
   if (code == SP_ERR_FAIL) {
     char* text = sp_last_error_message();
@@ -104,7 +104,7 @@ class SerialPort : public BytePort {
                                 ? SP_ERR_ARG
                                 : sp_blocking_read_next(port_, buffer.data(), buffer.size(),
                                                         static_cast<unsigned>(wait));
-    // Of a port that is gone some systems read nothing for ever; its count of bytes is an error.
+    // When a port is gone, some systems read nothing for ever. Its count of bytes is then an error.
     if (count < 0 || (count == 0 && sp_input_waiting(port_) < 0)) {
       return tl::unexpected(Gone().error());
     }

@@ -24,10 +24,10 @@ struct CapturedFile {
   std::uint64_t bytes = 0;
 };
 
-// The camera of the rig, as a capture sees it. One owner, one thread at a time. Implementations say in
-// their headers which states they have; for a caller there are two, open and not: Open() begins, Close()
-// ends, and after a failed Capture() the camera is either still open, or every call fails with kDevice
-// until Open() has found it again.
+// The camera of the rig, as a capture sees it. One owner, one thread at a time. Implementations say
+// in their headers which states they have; for a caller there are two, open and not: Open() begins,
+// Close() ends, and after a failed Capture() the camera is either still open, or every call fails
+// with kDevice until Open() has found it again.
 class TetheredCamera {
  public:
   TetheredCamera() = default;
@@ -35,8 +35,8 @@ class TetheredCamera {
   TetheredCamera& operator=(const TetheredCamera&) = delete;
   virtual ~TetheredCamera() = default;
 
-  // Finds the camera, connects, and checks what a capture needs: RAW files, manual exposure and, where
-  // the camera says it, manual focus. kDevice: which of them is missing, and how to fix it.
+  // Finds the camera, connects, and checks what a capture needs: RAW files, manual exposure and,
+  // where the camera says it, manual focus. kDevice: which of them is missing, and how to fix it.
   [[nodiscard]] virtual Result<CameraInfo> Open() = 0;
 
   // Sets what differs from what the camera has, reads everything back and returns that.
@@ -46,14 +46,15 @@ class TetheredCamera {
   // Returns the exposure times that may be set, ascending; empty where the camera does not say. [s]
   [[nodiscard]] virtual std::vector<double> ExposureTimes() const = 0;
 
-  // Takes one frame. It is downloaded to a new file in `folder`, its size is checked, and it is deleted
-  // from the camera. A file in `folder` is whole: what arrives in part is removed.
-  // kTimeout: nothing whole within the deadline; kDevice: the camera refused, or is gone; kIo: the file
-  // cannot be written.
+  // Takes one frame. It is downloaded to a new file in `folder`, its size is checked, and it is
+  // deleted from the camera. A file in `folder` is whole: what arrives in part is removed.
+  // kTimeout: nothing whole within the deadline; kDevice: the camera refused, or is gone; kIo: the
+  // file cannot be written.
   [[nodiscard]] virtual Result<CapturedFile> Capture(const std::filesystem::path& folder,
                                                      std::chrono::milliseconds deadline) = 0;
 
-  // Returns whether the latest Capture() failed for a reason that only a person can fix: a full card.
+  // Returns whether the latest Capture() failed for a reason that only a person can fix: a full
+  // card.
   [[nodiscard]] virtual bool NeedsAPerson() const { return false; }
 
   virtual void Close() noexcept = 0;

@@ -23,7 +23,7 @@ namespace fs = std::filesystem;
 
 constexpr const char* kProgramName = "sateen-camera-worker";
 
-// What libgphoto2 prints is no answer to anything that a person asked.
+// Starts the program without its output: what libgphoto2 prints answers no question of a person.
 int SpawnQuietly(const std::string& program, int socket, pid_t& process) {
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);

@@ -23,8 +23,9 @@ class WorkerProcess {
   WorkerProcess& operator=(WorkerProcess&& other) noexcept;
   ~WorkerProcess() { Kill(); }
 
-  // One request and its answer. kTimeout: none within `longest`; the process is killed then, because
-  // a later answer would be taken for that of another request. kDevice: the process has ended.
+  // One request and its answer. kTimeout: none within `longest`; the process is killed then,
+  // because a later answer would be taken for that of another request. kDevice: the process has
+  // ended.
   [[nodiscard]] Result<nlohmann::json> Ask(const nlohmann::json& request,
                                            std::chrono::milliseconds longest);
   [[nodiscard]] bool Running() const { return process_ > 0; }

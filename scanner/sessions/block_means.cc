@@ -11,13 +11,14 @@
 namespace sateen {
 namespace {
 
-constexpr float kSaturationLevel = 0.98F;  // of what saturates
-constexpr int kFewestSites = 4;            // along each side of a block
+constexpr float kSaturationLevel = 0.98F;  // share of what saturates
+constexpr int kFewestSites = 4;            // sites along each side of a block
 
-// What one block adds up, for each colour.
+// Sums over one block, for each colour.
 struct BlockSums {
   std::array<double, 3> value = {};
-  std::array<double, 3> difference2 = {};  // of horizontal neighbours of one colour, squared
+  std::array<double, 3> difference2 =
+      {};  // squared differences of horizontal neighbours of one colour
   std::array<double, 3> count = {};
   std::array<double, 3> pairs = {};
   bool saturated = false;

@@ -21,7 +21,8 @@ struct BlockGrid {
 
 struct BlockMean {
   Eigen::Vector3d radiance_rgb = Eigen::Vector3d::Zero();
-  // Of one site, from how neighbours of one colour differ: a slope across the block is no noise.
+  // Variance of one site, from how neighbours of one colour differ: a slope across the block is no
+  // noise.
   Eigen::Vector3d site_variance_rgb = Eigen::Vector3d::Zero();
   Eigen::Vector3d sites_rgb = Eigen::Vector3d::Zero();  // how many sites of each colour
   bool saturated = false;                               // a site at or above 98 % of what saturates
@@ -29,7 +30,7 @@ struct BlockMean {
 
 // A frame as the means of its blocks, rows from the top: what a fit of smooth light needs of it.
 struct BlockMeans {
-  ImageSize size_px;  // of the frame
+  ImageSize size_px;  // size of the frame
   BlockGrid grid;
   std::vector<BlockMean> blocks;
   std::string sha256;
@@ -40,11 +41,11 @@ struct BlockMeans {
   [[nodiscard]] Eigen::AlignedBox2d Extent(int column, int row) const;
 };
 
-/// Reads a frame of a session: camera RAW straight from the mosaic, each colour from its own sites, or
-/// a linear image.
+/// Reads a frame of a session: camera RAW straight from the mosaic, each colour from its own sites,
+/// or a linear image.
 ///
-/// Errors   kIo, kBadData as ReadRawMosaic() and ReadPhoto(); the hash differs from the recorded one;
-///          the frame has fewer than 4 x 4 sites a block
+/// Errors   kIo, kBadData as ReadRawMosaic() and ReadPhoto(); the hash differs from the recorded
+///          one; the frame has fewer than 4 x 4 sites per block
 [[nodiscard]] Result<BlockMeans> ReadBlockMeans(const FrameFile& file, const BlockGrid& grid);
 
 // The same of a frame that has been decoded; without a hash.

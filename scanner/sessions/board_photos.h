@@ -20,12 +20,12 @@ struct BoardPhoto {
 
 struct BoardFolder {
   std::vector<BoardPhoto> photos;                      // in natural order of their names
-  std::vector<std::string> ignored;                    // what else lies there, with the reason
-  std::map<std::string, std::string> sha256_of_input;  // of the sessions' records
+  std::vector<std::string> ignored;                    // other files there, with the reason
+  std::map<std::string, std::string> sha256_of_input;  // hashes of the sessions' records
 };
 
-/// What a path holds of a board: a photograph; a session of kind `board`; or a folder of
-/// photographs (JPEG, PNG, TIFF, TGA, EXR, camera RAW) and of such sessions. A session is one
+/// Lists the photographs of a board at a path: a photograph; a session of kind `board`; or a folder
+/// of photographs (JPEG, PNG, TIFF, TGA, EXR, camera RAW) and of such sessions. A session is one
 /// photograph. The rig that it names is not read.
 ///
 /// Errors   kIo: the path is absent or cannot be listed

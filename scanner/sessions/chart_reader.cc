@@ -17,10 +17,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kBrightShare = 0.02;  // of the picture: the white patch and more
+constexpr double kBrightShare = 0.02;  // share of the picture: the white patch and more
 constexpr float kWellBelowWhite = 0.5F;
 constexpr float kBelowWhite = 0.9F;
-constexpr size_t kFewestPatchSites = 400;  // of a patch: a hundred red ones
+constexpr size_t kFewestPatchSites = 400;  // sites per patch: a hundred red ones
 
 struct ChartFile {
   FrameFile file;

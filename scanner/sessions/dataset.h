@@ -30,7 +30,7 @@ struct Dataset {
   std::string layout;  // "session", "diligent", "lp", "lights.txt", "photographs"
   LightStack stack;    // K frames, all of one size; empty where there are mosaics
   std::optional<LoadedMosaics> mosaics;
-  std::string why_no_mosaics;  // of Domain::kAuto
+  std::string why_no_mosaics;  // reason that Domain::kAuto found no mosaics
   Rig rig;                     // K lights in the order of the frames; camera where known
   std::optional<Mask> mask;    // the part of the image that counts; at least one pixel
   std::optional<Truth> truth;
@@ -55,8 +55,8 @@ struct ReadDatasetOptions {
   std::optional<std::filesystem::path> mask_file = std::nullopt;
   // A simulated session whose truth is this dataset's too, in place of what lies beside it.
   std::optional<std::filesystem::path> truth_dir = std::nullopt;
-  // Of a folder that is no session take all photographs, one for each light, whose directions are
-  // not known yet (docs/calibration.md, Chrome spheres).
+  // Whether to take all photographs of a folder that is no session, one per light. The lights'
+  // directions are not known yet (docs/calibration.md, Chrome spheres).
   bool lights_unknown = false;
   Encoding encoding = Encoding::kAuto;
   Domain domain = Domain::kRgb;
@@ -66,13 +66,13 @@ struct ReadDatasetOptions {
 };
 
 /// Reads a dataset as it is: a folder with session.json (docs/formats.md), a DiLiGenT folder, an
-/// RTI .lp file, a folder of images with a lights.txt in it or one folder up, or, with a rig file, a
-/// folder of images alone. Where a folder could be several of these, the first counts.
+/// RTI .lp file, a folder of images with a lights.txt in it or one folder up, or, with a rig file,
+/// a folder of images alone. Where a folder could be several of these, the first counts.
 ///
 /// Errors   kInvalidArgument: a light that `options` asks for does not exist, or is asked for twice
 ///          kIo: a file is absent or unreadable
-///          kBadData: Domain::kRaw of a dataset that has no mosaics; wrong counts, sizes or formats;
-///          a light of zero length; a hash that differs
+///          kBadData: Domain::kRaw of a dataset that has no mosaics; wrong counts, sizes or
+///          formats; a light of zero length; a hash that differs
 ///          kCancelled
 [[nodiscard]] Result<Dataset> ReadDataset(const std::filesystem::path& path,
                                           const ReadDatasetOptions& options, const Task& task = {});

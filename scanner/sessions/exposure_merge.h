@@ -18,7 +18,8 @@ struct ReadingNoise {
   double per_reading = 1.0;
   double floor = 0.0;
 
-  // Weight of the radiance v / H where radiance is i: H^2 / var(i H), up to a factor common to all H.
+  // Returns the weight of the radiance v / H where radiance is i: H^2 / var(i H), up to a factor
+  // common to all H.
   [[nodiscard]] double Weight(double radiance, double exposure) const;
 };
 
@@ -26,15 +27,18 @@ struct ReadingNoise {
 
 /// Several exposures H_b of one plane as one of radiance:
 ///
-///     i = sum_b w_b v_b / H_b / sum_b w_b,   w_b = H_b^2 / var(i_0 H_b), 0 where v_b is saturated (1)
+///     i = sum_b w_b v_b / H_b / sum_b w_b,   w_b = H_b^2 / var(i_0 H_b)                      (1)
 ///
-/// i_0 is the radiance by the longest exposure that is not saturated, as the mean over the 5 x 5 samples
-/// of its kind around: one figure for all b, and hardly the noise of the reading itself. A weight from
-/// that would prefer readings that noise has made small: of a few electrons, by 1 % of their noise.
+/// w_b is 0 where v_b is saturated.
+///
+/// i_0 is the radiance by the longest exposure that is not saturated, as the mean over the 5 x 5
+/// samples of its kind around: one figure for all b, and hardly the noise of the reading itself. A
+/// weight from that would prefer readings that noise has made small: of a few electrons, by 1 % of
+/// their noise.
 ///
 /// Exposures are added from the longest to the shortest.
-/// Memory   three floats a sample, and three more while one is added, however many there are; the same
-///          bits every time
+/// Memory   three floats per sample, and three more while one is added, however many there are; the
+///          same bits every time
 /// Source   weights by inverse variance: Hasinoff, Durand, Freeman, "Noise-optimal capture for high
 ///          dynamic range photography", CVPR 2010; i_0 as the place of the variance is ours.
 class ExposureMerge {

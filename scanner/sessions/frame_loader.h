@@ -19,21 +19,23 @@ struct LoadedFrames {
   std::map<std::string, std::string> sha256_of_input;
 };
 
-/// Reads and decodes the lit frames on all threads of `task`, subtracts the mean of the dark frames:
+/// Reads and decodes the lit frames on all threads of `task`, subtracts the mean of the dark
+/// frames:
 ///
 ///     i_k = v_k / H_k - mean_d(v_d / H_d),    full_scale_k = saturation_k / H_k            (1)
 ///
-/// v is the file's value, balanced by the rig's response (scanner/sessions/sensor_reading.h), H its exposure.
-/// The mean of the dark is weighted by H_d^2, because a dark frame's noise is that of the read-out. A
-/// sample that is saturated before the subtraction stays at full_scale, so that a bright dark frame
-/// cannot hide that it is.
+/// v is the file's value, balanced by the rig's response (scanner/sessions/sensor_reading.h), H its
+/// exposure. The mean of the dark is weighted by H_d^2, because a dark frame's noise is that of the
+/// read-out. A sample that is saturated before the subtraction stays at full_scale, so that a
+/// bright dark frame cannot hide that it is.
 ///
-/// Several exposures of a light are merged (scanner/sessions/exposure_merge.h), camera RAW site by site: a site
-/// saturates alone, and a demosaiced pixel would carry it into its neighbours. full_scale is then that
-/// of the shortest. A frame whose file has a shift_px is laid over the first (scanner/sessions/frame_shift.h).
+/// Several exposures of a light are merged (scanner/sessions/exposure_merge.h), camera RAW site by
+/// site: a site saturates alone, and a demosaiced pixel would carry it into its neighbours.
+/// full_scale is then that of the shortest. A frame whose file has a shift_px is laid over the
+/// first (scanner/sessions/frame_shift.h).
 ///
 /// At least one light, each with at least one frame.
-/// Memory   K images, and for each thread some sixteen planes more, however many exposures there are
+/// Memory   K images, and some sixteen planes more per thread, for any number of exposures
 ///
 /// Errors   kIo: a file is absent or unreadable
 ///          kBadData: a file is no image, has another hash than recorded, or another size than the

@@ -71,7 +71,7 @@ LanczosWindow LanczosAt(double shift) {
     h[static_cast<size_t>(m)] = Sinc(t) * Sinc(t / 3.0);  // (1)
     sum += h[static_cast<size_t>(m)];
   }
-  // Rounding leaves 4e-17 where a whole shift has no weight at all; that must not saturate a sample.
+  // Rounding leaves 4e-17 where a whole shift has no weight at all. It must not saturate a sample.
   std::ranges::transform(h, window.weights.begin(), [&](double w) {
     return std::abs(w) < kLeastWeight ? 0.0F : static_cast<float>(w / sum);
   });

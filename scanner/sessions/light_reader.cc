@@ -12,8 +12,8 @@
 namespace sateen {
 namespace {
 
-// Times the radiance at which the last channel saturates. A saturated site must not pass as a mean of
-// it and its neighbours: whatever pixel it has a part in, at least a quarter, comes out above.
+// Times the radiance at which the last channel saturates. A saturated site must not pass as a mean
+// of it and its neighbours: whatever pixel it has a part in, at least a quarter, comes out above.
 constexpr float kSaturatedSite = 8.0F;
 
 size_t ColourAt(const RawMosaic& mosaic, int x, int y) {
@@ -135,7 +135,7 @@ Result<LightFrame> MergePhotos(const LightFiles& files, Encoding encoding, bool&
   return frame;
 }
 
-// Of one kind and one size, or there is nothing to merge.
+// Fails if the files differ in kind or size: such files cannot be merged.
 Status CheckAlike(const LightFiles& files) {
   for (const FrameFile& file : files) {
     if (IsRawName(file.path) != IsRawName(files.front().path)) {

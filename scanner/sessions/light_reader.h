@@ -10,15 +10,15 @@
 
 namespace sateen {
 
-// What the files of one light show together: balanced radiance, nothing subtracted.
+// Result of one light's files together: balanced radiance, nothing subtracted.
 struct LightReading {
   LightFrame frame;
   bool was_srgb = false;
   std::map<std::string, std::string> sha256_of_input;
 };
 
-/// Reads the file of a light, or merges its several exposures (scanner/sessions/exposure_merge.h), one after
-/// the other. A saturated RAW site saturates every pixel that it has a part in.
+/// Reads the file of a light, or merges its several exposures (scanner/sessions/exposure_merge.h),
+/// one after the other. A saturated RAW site saturates every pixel that it has a part in.
 ///
 /// Errors   as LoadFrames()
 [[nodiscard]] Result<LightReading> ReadLight(const LightFiles& files, Encoding encoding);

@@ -159,7 +159,7 @@ Result<MosaicFrame> FrameOf(const FrameFile& file, const RawReadings& readings,
   });
 }
 
-// What is known once the first frame is decoded, and one entry for each frame.
+// Facts that are known once the first frame is decoded, and one entry for each frame.
 struct Decoding {
   MosaicMemory memory;
   std::optional<SensorNoise> noise;

@@ -15,7 +15,8 @@
 
 namespace sateen {
 
-// Readings of a dataset. The stack keeps them in memory, or in an unnamed file that is deleted with it.
+// Readings of a dataset. The stack keeps them in memory, or in an unnamed file that is deleted with
+// the stack.
 struct LoadedMosaics {
   MosaicStack stack;
   std::map<std::string, std::string> sha256_of_input;
@@ -31,8 +32,9 @@ struct MosaicMemory {
   std::uintmax_t decoded = std::uintmax_t{640} << 20;   // at the same time, but one frame at least
 };
 
-/// Decodes the frames of a plan whose WhyNoMosaics() is nothing; `noise` is the same for all. Readings
-/// beyond memory.readings go to a scratch file in `scratch_dir`, row by row as they are decoded.
+/// Decodes the frames of a plan whose WhyNoMosaics() is nothing; `noise` is the same for all.
+/// Readings beyond memory.readings go to a scratch file in `scratch_dir`, row by row as they are
+/// decoded.
 ///
 /// Errors  as LoadFrames(); kIo where the scratch file cannot be written, with the room it needs
 [[nodiscard]] Result<LoadedMosaics> LoadMosaics(const ReadPlan& plan,

@@ -19,21 +19,22 @@ namespace {
 
 constexpr int kTileWidth = 32;  // sites; even, as the pattern of colours is
 constexpr int kTileHeight = 16;
-constexpr size_t kSitesOfTile = kTileWidth * kTileHeight / 4;  // of one place in the 2x2 pattern
-constexpr int kTileRows = 64;                                  // that are looked at
-constexpr double kLeastTexture = 1e-9;  // of the sum's squares, below which there is no slope
-constexpr size_t kGroups = 16;          // of about equally bright tiles of a colour
-constexpr size_t kTilesOfGroup = 4;     // at least
-constexpr double kHighestShare = 0.9;   // of the white level, up to which readings are linear
+constexpr size_t kSitesOfTile =
+    kTileWidth * kTileHeight / 4;       // sites of one place in the 2x2 pattern
+constexpr int kTileRows = 64;           // rows of tiles that are looked at
+constexpr double kLeastTexture = 1e-9;  // share of the sum's squares below which there is no slope
+constexpr size_t kGroups = 16;          // groups of about equally bright tiles per colour
+constexpr size_t kTilesOfGroup = 4;     // tiles per group, at least
+constexpr double kHighestShare = 0.9;   // share of the white level up to which readings are linear
 // Times the variance that noise has by what most groups say.
 constexpr double kMovedVariance = 1.5;
-// Standard deviations by which the groups lie off a line of gain and read noise: a picture that moved as a
-// whole by 0.2 pixels is off by 3, noise by 1.
+// Standard deviations by which the groups lie off a line of gain and read noise. A picture that
+// moved as a whole by 0.2 pixels is off by 3, noise by 1.
 constexpr double kMostMisfit = 2.0;
 // A median says as much as the mean of this share of the values.
 constexpr double kMedianWorth = 0.64;
 
-// Of one site of the 2x2 pattern in a tile.
+// Noise of one site of the 2x2 pattern in a tile.
 struct TileNoise {
   double mean_dn = 0.0;
   double variance_dn2 = 0.0;

@@ -9,16 +9,16 @@
 
 namespace sateen {
 
-/// How a frame's value becomes balanced radiance (times its exposure), by the response of the rig
-/// that it is read for:
+/// Turns a frame's value into balanced radiance (times its exposure), by the response of the rig
+/// for which it is read:
 ///
 ///     v' = w_c (v + shift),     shift = (black_file - black) / (white_file - black_file)    (1)
 ///     saturation = (min(white, white_file) - black_file) / (white_file - black_file)        (2)
 ///
-/// v is the file's own fraction of the way from its black to its white level, so that a measured black
-/// or white never changes the unit of radiance; w is the rig's white balance, which every frame of
-/// the rig gets, sheet and fabric alike, so that the lights' fluxes are balanced too. Without a
-/// response v' = v and saturation = 1.
+/// v is the file's own fraction of the way from its black to its white level, so that a measured
+/// black or white never changes the unit of radiance; w is the rig's white balance, which every
+/// frame of the rig gets, sheet and fabric alike, so that the lights' fluxes are balanced too.
+/// Without a response v' = v and saturation = 1.
 struct SensorReading {
   std::array<float, 3> balance = {1.0F, 1.0F, 1.0F};
   float shift = 0.0F;

@@ -28,8 +28,8 @@ struct SessionFrame {
   std::optional<double> exposure_s;
   std::optional<double> f_number;
   std::optional<double> iso;
-  // Shift of its picture from the first lit frame's, where camera or fabric moved a little: a point at
-  // x there is at x + shift_px here. [px right, px down]
+  // Shift of its picture from the first lit frame's, where camera or fabric moved a little: a point
+  // at x there is at x + shift_px here. [px right, px down]
   std::optional<Eigen::Vector2d> shift_px;
 
   /// Returns H, by which a file's value is divided to give radiance:

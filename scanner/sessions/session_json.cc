@@ -12,7 +12,8 @@ constexpr std::array kKinds = {SessionKind::kFabric, SessionKind::kSheet, Sessio
                                SessionKind::kBoard};
 constexpr std::array kRoles = {FrameRole::kLit, FrameRole::kDark, FrameRole::kRepeat};
 
-constexpr double kMostShiftPx = 100.0;  // what a capture may accept (FrameCheckOptions)
+constexpr double kMostShiftPx =
+    100.0;  // largest shift that a capture may accept (FrameCheckOptions)
 
 // The value whose name stands at `key`; the first one after a failure.
 template <typename Enum, size_t N>

@@ -8,7 +8,7 @@
 #include "core/json.h"
 #include "scanner/sessions/session.h"
 
-// What session.json and journal.jsonl have in common. For .cc files only.
+// Common parts of session.json and journal.jsonl. For .cc files only.
 namespace sateen {
 
 [[nodiscard]] SessionKind ReadSessionKind(JsonReader& json, std::string_view key);

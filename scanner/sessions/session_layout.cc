@@ -12,7 +12,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kOtherLens = 0.1;       // of the focal length
+constexpr double kOtherLens = 0.1;       // share of the focal length
 constexpr double kOtherPlaceMm = 150.0;  // no ruler is so wrong
 
 Status ReadRigInto(const fs::path& path, const std::optional<std::string>& recorded_sha256,
@@ -44,7 +44,8 @@ std::string NamesOf(const Lights& lights) {
   return names;
 }
 
-// Of one light several exposures of one picture may be merged, and nothing else.
+// Adds a file to its light. Fails unless the light's files differ in exposure alone: only several
+// exposures of one picture may be merged.
 Status AddToLight(const FrameFile& file, const SessionFrame& frame, const Session& session,
                   const std::string& where, const fs::path& dir, LightFiles& files) {
   for (const FrameFile& other : files) {
@@ -127,8 +128,8 @@ Status AssignFrames(const fs::path& dir, ReadPlan& plan) {
   return CheckSettings(*plan.session, where);
 }
 
-// A light's frame and its repeat, which ReadSession() leaves out; nothing where they are not camera RAW
-// of one exposure.
+// Returns a light's frame and its repeat, which ReadSession() leaves out; nothing if they are not
+// camera RAW of one exposure.
 Result<std::optional<RepeatedLight>> FindRepeat(const fs::path& dir, const ReadPlan& plan) {
   const Result<Session> record = ReadSessionRecord(dir);
   if (!record) {

@@ -8,8 +8,8 @@
 
 namespace sateen {
 
-// Plans a folder with session.json. The rig is options.rig_file, else the one that the session names.
-// Frames are matched to its lights by name.
+// Plans a folder with session.json. The rig is options.rig_file, else the one that the session
+// names. Frames are matched to its lights by name.
 [[nodiscard]] Result<ReadPlan> PlanSession(const std::filesystem::path& dir,
                                            const ReadDatasetOptions& options);
 

@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kMostSpoilt = 0.5;   // share of a frame's blocks
 constexpr double kDarkSignal = 20.0;  // times its own standard deviation: light, not noise
-// Of a noiseless simulation, so that weights stay finite.
+// Variance for a noiseless simulation, so that weights stay finite.
 constexpr double kSmallestVariance = 1e-14;
 
 // Variance of a site over its radiance, for each colour: on white paper all noise is that of the

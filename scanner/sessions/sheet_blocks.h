@@ -18,7 +18,7 @@ struct BlockSample {
   bool saturated = false;
 };
 
-/// What each block of a frame says of the light. `dark`: the mean of the dark frames, or nothing.
+/// Returns each block's sample of the light. `dark`: the mean of the dark frames, or nothing.
 ///
 ///     sd^2 = (median over blocks of variance / radiance) radiance / sites         each colour
 [[nodiscard]] std::vector<BlockSample> BlockSamplesOf(const BlockMeans& means,
@@ -37,7 +37,7 @@ struct Spoilt {
   double saturated = 0.0;
   double unlit = 0.0;
 
-  // What is wrong with more than half of them.
+  // Returns the fault that more than half of the blocks have.
   [[nodiscard]] FrameFault Fault() const;
 };
 

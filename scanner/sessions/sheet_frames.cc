@@ -11,7 +11,7 @@ namespace sateen {
 namespace {
 
 constexpr double kPaperShare =
-    0.75;  // of the sites of a colour are darker: a bright place of paper
+    0.75;  // share of the sites of a colour that are darker: a bright place of paper
 
 // Each colour times what makes the paper grey.
 Image<float> BalancedMosaic(RawMosaic mosaic) {

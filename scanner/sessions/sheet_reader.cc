@@ -188,7 +188,7 @@ class SheetReader {
     });
   }
 
-  // [light][block]; none of a light without a frame.
+  // [light][block]; no blocks for a light without a frame.
   Status TakeBlocks() {
     const Places everywhere(
         static_cast<size_t>(options_.grid.columns) * static_cast<size_t>(options_.grid.rows),
@@ -277,7 +277,7 @@ class SheetReader {
   const Task task_;
   std::vector<Eigen::Vector3d> dark_;
   std::vector<std::pair<size_t, const FrameFile*>> files_;  // with the light, longest first
-  std::vector<Result<BlockMeans>> means_;                   // of each file
+  std::vector<Result<BlockMeans>> means_;                   // one per file
   std::vector<std::vector<BlockSample>> blocks_;
   std::vector<std::optional<size_t>>
       usable_;      // [light]: its longest exposure to find the border in

@@ -20,12 +20,12 @@ struct ReadSheetOptions {
   // The rough rig in place of the one that the session names; lights are matched by name.
   std::optional<std::filesystem::path> rig_file = std::nullopt;
   BlockGrid grid = {};
-  // What is printed on the sheet: where `table_from_sheet` is not recorded it is found by the
-  // border, and samples are taken from the blank inside alone.
+  // Border printed on the sheet. Where `table_from_sheet` is not recorded it is found by the
+  // border. Samples are taken from the blank inside alone.
   std::optional<SheetBorder> border = std::nullopt;
   bool find_poses = false;  // by the border, also where they are recorded
-  // A frame that is dark or saturated over more than half of the sheet, or missing, leaves its light
-  // without samples, with the reason in Sheet::faults, in place of an error.
+  // A frame that is dark or saturated over more than half of the sheet, or missing, leaves its
+  // light without samples, with the reason in Sheet::faults, in place of an error.
   bool allow_bad_frames = false;
 };
 
@@ -45,16 +45,17 @@ struct Sheet {
   std::map<std::string, std::string> sha256_of_input;
 };
 
-/// Reads a sheet session frame by frame: memory for one frame a thread. The sheet lies where
+/// Reads a sheet session frame by frame: memory for one frame per thread. The sheet lies where
 /// `table_from_sheet` of the session says, or where its border is seen, or on the table.
 ///
 /// Where a light has several exposures, each block is taken from the longest that is not saturated
-/// there: paper is bright, so the others would add little. shift_px of a frame is left aside: a block
-/// is tens of pixels wide and paper has no texture, so that a pixel moves its mean by less than 1e-3
-/// of what neighbouring blocks differ by.
+/// there: paper is bright, so the others would add little. shift_px of a frame is left aside: a
+/// block is tens of pixels wide and paper has no texture, so that a pixel moves its mean by less
+/// than 1e-3 of what neighbouring blocks differ by.
 ///
-/// Errors   kIo, kBadData: as ReadDataset(); the session is of another kind; the rig has no camera; a
-///          light without a frame; a frame that is saturated or dark over more than half of the sheet
+/// Errors   kIo, kBadData: as ReadDataset(); the session is of another kind; the rig has no camera;
+///          a light without a frame; a frame that is saturated or dark over more than half of the
+///          sheet
 ///          kDegenerate: as FitSheetPose(), with the session's folder; kCancelled
 [[nodiscard]] Result<Sheet> ReadSheet(const std::filesystem::path& dir,
                                       const ReadSheetOptions& options, const Task& task = {});

@@ -10,7 +10,7 @@
 
 namespace sateen {
 
-// What known answers lie beside a capture.
+// Known answers beside a capture.
 struct Truth {
   Image3 normal;                 // x right, y up, z to the viewer; zero where unknown
   std::optional<Image3> albedo;  // simulated sessions only

@@ -30,10 +30,10 @@ namespace sateen {
 // The first mask.* in `dir`, a folder that need not be ours: nothing where it cannot be listed.
 [[nodiscard]] std::optional<std::filesystem::path> FindSharedMask(const std::filesystem::path& dir);
 
-// What a person finds in the folder, for messages: "12 files (10 .png, 2 .txt), 1 folder".
+// Describes the contents of the folder for messages: "12 files (10 .png, 2 .txt), 1 folder".
 [[nodiscard]] std::string DescribeFolder(const std::filesystem::path& dir);
 
-// False also where the path cannot be looked at; reading it will then say why.
+// Returns false also where the path cannot be looked at; reading it will then say why.
 [[nodiscard]] bool Exists(const std::filesystem::path& path);
 
 // ASCII only: the file name endings and words that we look for.

@@ -8,7 +8,7 @@
 namespace sateen {
 namespace {
 
-constexpr double kRead = 0.6;  // of a patch's side
+constexpr double kRead = 0.6;  // share of a patch's side that is read
 
 }  // namespace
 

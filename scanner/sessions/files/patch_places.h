@@ -14,12 +14,12 @@ namespace sateen {
 // Where in the mosaic the sites of a patch are.
 struct PatchPlaces {
   PatchSites sites;
-  std::vector<size_t> index;                  // of each site in the mosaic
-  std::array<Eigen::Vector2d, 4> corners_px;  // of what is read, in turn around it
+  std::vector<size_t> index;                  // index in the mosaic, one per site
+  std::array<Eigen::Vector2d, 4> corners_px;  // corners of what is read, in turn around it
 };
 
-/// The sites in the middle 60 % of a patch, along each side, of a chart that lies on the table; none
-/// where it is out of the picture.
+/// Returns the sites in the middle 60 % of a patch, along each side, of a chart that lies on the
+/// table. Returns none if it is out of the picture.
 ///
 /// patch_mm  its side
 /// mosaic    any of the camera: of it the size and the pattern of colours count

@@ -3,7 +3,8 @@
 namespace sateen {
 namespace {
 
-constexpr double kRigidTolerance = 1e-6;  // of a rotation written with nine digits or more
+constexpr double kRigidTolerance =
+    1e-6;  // tolerance for a rotation written with nine digits or more
 constexpr const char* kPoseKey = "table_from_target";
 
 }  // namespace
