@@ -8,7 +8,8 @@
 
 namespace sateen {
 
-// What the caller can do about it; ExitStatus() maps each to one exit status of the program.
+// Kinds of error, by what the caller can do; ExitStatus() maps each to one exit status of the
+// program.
 enum class ErrorCode {
   kInvalidArgument,  // the caller's options are wrong: change the command
   kBadData,          // a file or a stack contradicts itself or its format: change the data

@@ -29,7 +29,7 @@ template <int N>
 std::optional<UnknownsMatrix<N>> CovarianceOf(const UnknownsMatrix<N>& a) {
   const Unknowns<N> scale = a.diagonal().cwiseSqrt().cwiseInverse();
   const Working<N> correlations = scale.asDiagonal() * a * scale.asDiagonal();
-  // D of L D L^T: what remains of each diagonal element, here 1, once the unknowns before are known.
+  // D of L D L^T: the rest of each diagonal element, here 1, once the unknowns before are known.
   const WorkingVector<N> own_part = Eigen::LDLT<Working<N>>(correlations).vectorD();
   if (!correlations.allFinite() || !(own_part.array() > kLeastOwnPart).all()) {
     return std::nullopt;

@@ -115,7 +115,8 @@ template <int N>
 /// settled   bool(const Unknowns<N>& step): true ends the method, converged, after that step
 /// Returns   the last state, its equations, and why the method ended. It returns a state that is
 ///           not converged, too: the caller decides by `end`.
-/// Cost      one call of `evaluate` at the start and one per step tried; no allocation if N is fixed
+/// Cost      one call of `evaluate` at the start and one per step tried; no allocation if N is
+///           fixed
 template <int N, typename State, typename Evaluate, typename Move, typename Settled>
 [[nodiscard]] GaussNewtonFit<N, State> MinimizeSquares(const State& start, const Evaluate& evaluate,
                                                        const Move& move,

@@ -58,7 +58,7 @@ class JsonReader {
   std::optional<int> FindInteger(std::string_view key, bool required);
   std::optional<double> FindNumber(std::string_view key, bool required);
   std::optional<std::string> FindString(std::string_view key, bool required);
-  // Of any length but 0 where `count` is nothing.
+  // Takes any length but 0 where `count` is nothing.
   std::optional<std::vector<double>> FindNumbers(std::string_view key, std::optional<size_t> count,
                                                  bool required);
   std::optional<JsonReader> FindObject(std::string_view key, bool required);
@@ -68,7 +68,7 @@ class JsonReader {
 
   const nlohmann::json* object_;
   std::string where_;
-  std::string path_;  // of this object in the file: "" or "lights[3]"
+  std::string path_;  // path of this object in the file: "" or "lights[3]"
   std::set<std::string, std::less<>> asked_;
   std::optional<Error> error_;
 };
@@ -77,7 +77,8 @@ class JsonReader {
 // nesting; `where` opens the message.
 [[nodiscard]] Result<nlohmann::json> ParseJson(const std::string& text, const std::string& where);
 
-// Takes "schema" out of an object where it is "<name>/<major>"; kBadData where it is another or none.
+// Takes "schema" out of an object if it is "<name>/<major>". Fails with kBadData if it is another
+// or missing.
 [[nodiscard]] Status TakeSchema(nlohmann::json& file, const std::string& where,
                                 std::string_view name, int major);
 

@@ -33,7 +33,7 @@ class ParseWatch {
   [[nodiscard]] const std::string& Problem() const { return problem_; }
 
  private:
-  std::vector<std::set<std::string>> keys_;  // of each open object
+  std::vector<std::set<std::string>> keys_;  // keys of each open object
   std::string problem_;
 };
 

@@ -66,7 +66,7 @@ struct SymmetricEigen {
 // Returns argmin_x |l x - i|^2 by Householder QR with column pivoting. Shapes as above; allocates.
 [[nodiscard]] Eigen::MatrixXd SolveByQr(const Eigen::MatrixXd& l, const Eigen::MatrixXd& i);
 
-// What SolveBySvd() returns.
+// Result of SolveBySvd().
 struct SvdSolution {
   Eigen::MatrixXd x;
   double condition = 0.0;  // largest singular value / smallest; infinite where that is 0

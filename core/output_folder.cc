@@ -221,7 +221,7 @@ Status OutputFolder::Commit() {
 
   Moves moves;
   if (Status placed = PutInPlace(staging_dir_, dir_, names_, retired_, folders, moves); !placed) {
-    if (!moves.TakeBack()) {  // what was there must not go with the staging folder
+    if (!moves.TakeBack()) {  // earlier files must not go with the staging folder
       placed.error().message += fmt::format("; the files that were there are kept in {}",
                                             std::exchange(staging_dir_, {}).string());
     }

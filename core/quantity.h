@@ -13,8 +13,8 @@ namespace sateen {
 // Reads "50%" or "0.5" as 0.5. kInvalidArgument: anything else, or not in 0 to 1.
 [[nodiscard]] Result<double> ParseLevel(std::string_view text);
 
-// Reads "500ms", "2s" or "1.5s", to the millisecond. kInvalidArgument: anything else, or not in 1 ms
-// to one hour.
+// Reads "500ms", "2s" or "1.5s", to the millisecond. kInvalidArgument: anything else, or not from
+// 1 ms to one hour.
 [[nodiscard]] Result<std::chrono::milliseconds> ParseDuration(std::string_view text);
 
 // Reads "1/50", "20ms", "0.5s" or "0.02", in seconds. kInvalidArgument: anything else, or not in

@@ -22,7 +22,7 @@ class Progress {
   virtual void Clear() = 0;
 };
 
-// What a long operation is run under. The default runs silently, on all cores, to its end.
+// Conditions that a long operation runs under. The default runs silently, on all cores, to its end.
 struct Task {
   // Threads to use; 0 means one for each core.
   int threads = 0;

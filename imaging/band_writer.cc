@@ -25,7 +25,7 @@ constexpr const char* kPngStrategy = "rle";
 constexpr size_t kBytesOnTheirWay = size_t{8} << 20;
 constexpr int kPngFilterUp = 0x20;
 
-// A file whose errors are not lost: OpenImageIO does not tell when its last buffer fails to reach the
+// A file that loses no errors: OpenImageIO does not tell when its last buffer fails to reach the
 // disk.
 class CheckedFile final : public OIIO::Filesystem::IOProxy {
  public:
@@ -87,7 +87,7 @@ struct BandWriter::Impl {
   int next_row = 0;
   CheckedFile file;
   std::unique_ptr<OIIO::ImageOutput> output;
-  std::vector<char> samples;  // of a band, interleaved
+  std::vector<char> samples;  // samples of a band, interleaved
 
   Impl(std::string file_path, OIIO::ImageSpec file_spec)
       : path(std::move(file_path)), spec(std::move(file_spec)), file(path) {}

@@ -21,7 +21,7 @@ namespace {
 
 constexpr uint16_t kD65 = 21;  // EXIF LightSource
 
-// ---- Header --------------------------------------------------------------------------------------
+// ---- Header -------------------------------------------------------------------------------------
 
 Status CheckWhole(const char* name, double value, double least, double most) {
   if (!(value >= least && value <= most) || value != std::floor(value)) {
@@ -79,7 +79,7 @@ Status CheckLevels(double black, double white) {
   return {};
 }
 
-// ---- A file in memory ----------------------------------------------------------------------------
+// ---- A file in memory ---------------------------------------------------------------------------
 // libtiff's error handlers are global and belong to whoever set them (OpenImageIO does), so they
 // stay as they are. Nothing speaks to them: tags are checked before, and memory refuses no write,
 // as there is room from the start.
@@ -130,7 +130,7 @@ struct CloseTiff {
   void operator()(TIFF* tiff) const { TIFFClose(tiff); }
 };
 
-// ---- Tags ----------------------------------------------------------------------------------------
+// ---- Tags ---------------------------------------------------------------------------------------
 
 class DngWriter {
  public:

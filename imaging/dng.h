@@ -11,7 +11,7 @@
 
 namespace sateen {
 
-// What a Bayer RAW file holds besides its samples.
+// Header of a Bayer RAW file: all that it holds besides its samples.
 struct DngHeader {
   // Colour (0 red, 1 green, 2 blue) at (x, y) = 00 10 01 11; two greens on a diagonal.
   std::array<uint8_t, 4> cfa = {0, 1, 1, 2};

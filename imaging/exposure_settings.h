@@ -2,7 +2,7 @@
 
 namespace sateen {
 
-// What a camera exposes a frame with.
+// Settings with which a camera exposes a frame.
 struct ExposureSettings {
   double exposure_s = 0.02;
   double f_number = 8.0;

@@ -101,8 +101,8 @@ Result<std::vector<T>> ReadSamples(const std::filesystem::path& path, OIIO::Imag
   std::vector<T> samples(static_cast<size_t>(spec.image_pixels()) * static_cast<size_t>(colours));
   const bool complete = input.read_image(/*subimage=*/0, /*miplevel=*/0, /*chbegin=*/0, colours,
                                          OIIO::BaseTypeFromC<T>::value, samples.data());
-  // Of a JPEG or an uncompressed TIFF that is cut short only the error text tells: the call
-  // succeeds and the rest is grey.
+  // If a JPEG or an uncompressed TIFF is cut short, only the error text tells: the call succeeds
+  // and the rest is grey.
   if (!complete || input.has_error()) {
     return Undecodable(path, input.geterror());
   }

@@ -18,7 +18,8 @@ inline constexpr double kRoundingDn = 0.28867513459481287;
 // Place in the 2x2 pattern of a mosaic: x % 2 + 2 (y % 2).
 using BySite = std::array<float, 4>;
 
-// How a frame's readings become radiance (imaging/light_stack.h): radiance = per_dn reading + at_zero.
+// How a frame's readings become radiance (imaging/light_stack.h):
+// radiance = per_dn reading + at_zero.
 struct MosaicFrame {
   BySite per_dn = {1.0F, 1.0F, 1.0F, 1.0F};
   BySite at_zero = {};
@@ -61,13 +62,13 @@ class MosaicsInMemory final : public MosaicRows {
 // The lit frames of a session as the sensor wrote them, one for each light, in the order of the
 // lights, then the dark ones.
 struct MosaicStack {
-  ImageSize size_px;                // of all frames
+  ImageSize size_px;                // size of all frames
   std::array<uint8_t, 4> cfa = {};  // colour of each site: 0 red, 1 green, 2 blue
   std::vector<MosaicFrame> lit;
   std::vector<MosaicFrame> dark;  // their mean by `dark_weights` is subtracted
   std::vector<float> dark_weights;
-  // Readings of the frames in the order lit, dark; never null in a stack that is solved. Copies of the
-  // stack share them.
+  // Readings of the frames in the order lit, dark; never null in a stack that is solved. Copies of
+  // the stack share them.
   std::shared_ptr<const MosaicRows> rows;
 };
 

@@ -53,8 +53,8 @@ Status CheckFits(const std::filesystem::path& path, const libraw_image_sizes_t& 
   return {};
 }
 
-// What keeps the file from being one integer sample a site under a 2x2 red, green, blue pattern;
-// empty if nothing does.
+// Returns what keeps the file from being one integer sample per site under a 2x2 red, green, blue
+// pattern; empty if nothing does.
 std::string_view NotBayer(LibRaw& raw) {
   const libraw_data_t& data = raw.imgdata;
   const libraw_iparams_t& id = data.idata;
@@ -125,7 +125,7 @@ void FillMetadata(const libraw_data_t& data, RawMosaic& mosaic) {
   }
 }
 
-// What the decoder holds, or why it is no mosaic that we know.
+// Returns the decoder's readings, or why they are no mosaic that we know.
 Result<RawReadings> ReadingsOf(const std::filesystem::path& path, LibRaw& raw) {
   const libraw_image_sizes_t& sizes = raw.imgdata.sizes;
   if (const std::string_view found = NotBayer(raw); !found.empty()) {
@@ -236,7 +236,8 @@ struct Neighbourhood {
   }
 };
 
-// Of a line of `count`, the place before the first is the second, after the last the last but one.
+// Mirrors a place in a line of `count`: the one before the first is the second, the one after the
+// last is the last but one.
 size_t Mirrored(int i, int count) {
   return static_cast<size_t>(i < 0 ? 1 : i >= count ? count - 2 : i);
 }

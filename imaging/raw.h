@@ -13,7 +13,7 @@
 
 namespace sateen {
 
-// A camera RAW file as the sensor saw it: one colour a site, linear, black subtracted,
+// A camera RAW file as the sensor saw it: one colour per site, linear, black subtracted,
 // 1 = white level. Values below black stay negative; some sensors read a little above white.
 struct RawMosaic {
   Image<float> samples;  // the visible area, at least 2x2, as the sensor lies (unrotated)
@@ -30,9 +30,9 @@ struct RawMosaic {
 
 // The same as integers, while the decoder holds them.
 struct RawReadings {
-  ImageSize size_px;                // of the visible area
+  ImageSize size_px;                // size of the visible area
   std::array<uint8_t, 4> cfa = {};  // as in RawMosaic
-  std::array<float, 4> black = {};  // [DN], of the four sites
+  std::array<float, 4> black = {};  // [DN], per site of the four
   float white = 0.0F;               // [DN]
   const uint16_t* first = nullptr;  // reading of site (0, 0)
   size_t pitch = 0;                 // from row to row, in readings
@@ -52,8 +52,8 @@ struct RawReadings {
 ///          kBadData: not a RAW file that can be decoded, cut short, or its CFA is not 2x2 Bayer
 [[nodiscard]] Result<RawMosaic> ReadRawMosaic(const std::filesystem::path& path);
 
-// Decodes as ReadRawMosaic, and hands `take` the readings, which are gone when it returns: nothing of
-// the image's size is kept beside what the decoder needs. Errors of `take` are passed on.
+// Decodes as ReadRawMosaic, and hands `take` the readings, which are gone when it returns. Nothing
+// of the image's size is kept beside what the decoder needs. Errors of `take` are passed on.
 [[nodiscard]] Status TakeRawReadings(const std::filesystem::path& path,
                                      const std::function<Status(const RawReadings&)>& take);
 

@@ -39,8 +39,8 @@ class Lambert final : public Brdf {
 
 struct FresnelBalancedSpec {
   Eigen::Vector3d albedo = Eigen::Vector3d::Constant(0.5);
-  Eigen::Vector3d f0 = Eigen::Vector3d::Constant(0.04);  // of the Ggx on top, [0, 1]
-  double alpha = 0.5;                                    // of the Ggx on top, [0.001, 1]
+  Eigen::Vector3d f0 = Eigen::Vector3d::Constant(0.04);  // f0 of the Ggx on top, [0, 1]
+  double alpha = 0.5;                                    // alpha of the Ggx on top, [0.001, 1]
   // Room: what a Ggx of this f0 and alpha leaves, so that both together conserve energy.
   bool energy_safe = true;
 

@@ -6,8 +6,8 @@
 
 namespace sateen {
 
-// What an isotropic model depends on: cosines between n, l, v and the half vector h. n_l keeps its
-// sign, so that a model can return 0 for light from below; the others are in [0, 1].
+// Angles that an isotropic model depends on: cosines between n, l, v and the half vector h. n_l
+// keeps its sign, so that a model can return 0 for light from below; the others are in [0, 1].
 struct IsotropicAngles {
   double n_l;
   double n_v;

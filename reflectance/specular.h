@@ -32,7 +32,8 @@ struct AnisotropicSpec {
   Eigen::Vector3d f0 = Eigen::Vector3d::Constant(0.04);
   double alpha = 0.5;       // along the tangent
   double anisotropy = 0.0;  // [0, 1]: across it max(alpha (1 - anisotropy), 0.001)
-  // Where it is rough: across the fibres of a yarn. Its part in the plane of the surface counts. Not zero.
+  // Direction in which it is rough: across the fibres of a yarn. Its part in the plane of the
+  // surface counts. Not zero.
   Eigen::Vector3d tangent = Eigen::Vector3d::UnitX();
 
   [[nodiscard]] Status Validate() const;

@@ -35,9 +35,9 @@ using Nullable = std::optional<std::optional<T>>;
 // Members that the records of all calibrators share.
 struct CalibrationRecord {
   std::optional<std::string> schema;   // "sateen.calibrate.lens/1"
-  std::optional<std::string> version;  // of the program
+  std::optional<std::string> version;  // version of the program
   std::optional<std::string> date;     // UTC, ISO 8601; empty in a report
-  std::optional<double> seconds;       // that the calibration took
+  std::optional<double> seconds;       // duration of the calibration
   std::optional<std::vector<std::string>> warnings;
   std::optional<std::map<std::string, std::string>> inputs;  // SHA-256 per file
   OtherKeys other;

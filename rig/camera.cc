@@ -8,7 +8,7 @@
 namespace sateen {
 namespace {
 
-constexpr double kRotationTolerance = 1e-6;  // of R^T R = 1; files may round to seven digits
+constexpr double kRotationTolerance = 1e-6;  // bound on R^T R - 1; files may round to seven digits
 constexpr int kMaxSizePx = 65536;
 
 Status CheckPose(const Eigen::Isometry3d& pose, std::string_view what) {

@@ -8,7 +8,7 @@ namespace {
 
 constexpr int kFewestKnots = 4;
 constexpr double kMostGain = 100.0;
-constexpr double kLeastFall = 1e-3;  // of the light's height
+constexpr double kLeastFall = 1e-3;  // share of the light's height
 
 // The four B of equation (1) at t from 0 to 1 within a cell, and their derivatives by t.
 struct Cell {

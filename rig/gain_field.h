@@ -16,11 +16,11 @@ inline constexpr int kMostFieldKnots = 256;  // along one side
 ///
 ///     g(x, y) = sum_rc gain[r columns + c] B((x - x_0) / h - c) B((y - y_0) / h - r)          (1)
 ///
-/// with the uniform cubic B-spline B (support -2 to 2, twice continuously differentiable), origin_mm
-/// (x_0, y_0) and spacing_mm h. The B of all knots add up to 1 from the second knot to the last but
-/// one; a point beyond has the gain of the nearest point of that rectangle.
+/// with the uniform cubic B-spline B (support -2 to 2, twice continuously differentiable),
+/// origin_mm (x_0, y_0) and spacing_mm h. The B of all knots add up to 1 from the second knot to
+/// the last but one; a point beyond has the gain of the nearest point of that rectangle.
 struct GainField {
-  Eigen::Vector2d origin_mm = Eigen::Vector2d::Zero();  // of the first knot; rows go up with y
+  Eigen::Vector2d origin_mm = Eigen::Vector2d::Zero();  // the first knot; rows go up with y
   double spacing_mm = 1.0;
   int columns = 0;
   int rows = 0;
@@ -45,10 +45,10 @@ struct GainField {
   bool operator==(const GainField&) const = default;
 };
 
-/// Where the ray from a light through x meets the table plane z = 0. A lamp that is small beside its
-/// distance sends out so much in each direction, and how much does not depend on how far along the ray
-/// a surface is met; so a gain that is known on the plane is known everywhere. A ray that does not come
-/// down meets the plane far away on its side.
+/// Returns where the ray from a light through x meets the table plane z = 0. A lamp that is small
+/// beside its distance sends out so much in each direction, and how much does not depend on how far
+/// along the ray a surface is met; so a gain that is known on the plane is known everywhere. A ray
+/// that does not come down meets the plane far away on its side.
 [[nodiscard]] Eigen::Vector2d ShadowOnTable(const Eigen::Vector3d& light_mm,
                                             const Eigen::Vector3d& x_mm);
 

@@ -21,7 +21,7 @@ enum class LightModel { kDistant, kNear, kLed, kLedField };
 // One LED as a plain value, in the table frame. Which fields count depends on `model`.
 struct Light {
   std::string name;
-  int channel = 0;  // of the LED board
+  int channel = 0;  // channel of the LED board
   LightModel model = LightModel::kDistant;
   // kDistant: unit vector from the table towards the light.
   Eigen::Vector3d direction = Eigen::Vector3d::UnitZ();
@@ -36,8 +36,8 @@ struct Light {
   // kDistant: irradiance; otherwise the irradiance at 1 m on the axis. Red, green, blue; > 0.
   Eigen::Vector3d flux_rgb = Eigen::Vector3d::Ones();
   // Standard deviations, where a calibration found them, all >= 0: along the table's axes (kNear
-  // and above); of the angle to the true direction (kDistant), root mean square; of the irradiance in
-  // the middle of the table, relative, with the covariance of flux and position.
+  // and above); of the angle to the true direction (kDistant), root mean square; of the irradiance
+  // in the middle of the table, relative, with the covariance of flux and position.
   std::optional<Eigen::Vector3d> position_sd_mm;
   std::optional<double> direction_sd_deg;
   std::optional<double> irradiance_sd;

@@ -6,8 +6,8 @@
 namespace sateen {
 namespace {
 
-// Below this a vector is a unit vector but for rounding and stays as it is, so that reading what was
-// written changes no bit.
+// Below this a vector is a unit vector but for rounding and stays as it is, so that reading what
+// was written changes no bit.
 constexpr double kUnitRounding = 1e-14;
 
 Eigen::Vector3d Unit(const Eigen::Vector3d& v) {

@@ -11,8 +11,8 @@ namespace sateen {
 
 [[nodiscard]] Eigen::Vector3d Vector3(const std::vector<double>& numbers);
 
-// kBadData: a key that is missing, unknown, out of range or not of the light's model. `what` names the
-// light in the messages. Direction and axis come back exactly normalised.
+// Fails with kBadData where a key is missing, unknown, out of range or not of the light's model.
+// `what` names the light in the messages. Direction and axis come back exactly normalised.
 [[nodiscard]] Result<Light> ReadLight(JsonReader reader, const std::string& what);
 
 [[nodiscard]] nlohmann::json ToJson(const Eigen::Vector3d& v);

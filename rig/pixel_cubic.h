@@ -1,6 +1,7 @@
 #pragma once
 
-// Cubic interpolation over the pixels of an image from knots at equal intervals of it; for .cc files.
+// Cubic interpolation over the pixels of an image from knots at equal intervals of it; for .cc
+// files.
 
 #include <algorithm>
 #include <array>
@@ -52,8 +53,8 @@ Cubic<Value> CubicOver(const std::vector<Value>& knots, size_t at, size_t stride
   return Cubic<Value>(f);
 }
 
-// Values at t, t + step, ... In float, which is four times as fast as double: the cubic spans little,
-// and a, to which it is added, is rounded once as any float is.
+// Fills in the values at t, t + step, ... In float, which is four times as fast as double: the
+// cubic spans little, and a, to which it is added, is rounded once as any float is.
 inline void FillCubic(const Cubic<double>& cubic, double from, float step,
                       std::span<float> values) {
   const auto a = static_cast<float>(cubic.a);

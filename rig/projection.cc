@@ -6,7 +6,7 @@
 namespace sateen {
 namespace {
 
-constexpr double kConverged = 1e-12;  // of x and y; below 1e-8 px for any real lens
+constexpr double kConverged = 1e-12;  // step of x and y; below 1e-8 px for any real lens
 constexpr int kMaxSteps = 100;        // five are usual; more only beside the fold
 
 // Equations (2) and (3), and their Jacobian, which is symmetric.
@@ -68,7 +68,7 @@ std::optional<Eigen::Vector2d> Undistort(const std::array<double, 5>& distortion
   Eigen::Vector2d x = Eigen::Vector2d::Zero();
   Distorted at_x = Distort(distortion, x);
   Eigen::Vector2d step = distorted;
-  double share = 1.0;  // of the step that is taken
+  double share = 1.0;  // share of the step that is taken
   for (int i = 0; i < kMaxSteps; ++i) {
     const Eigen::Vector2d next_x = x + share * step;
     const Distorted at_next = Distort(distortion, next_x);

@@ -47,12 +47,12 @@ struct Rig {
                                 const Eigen::Vector3d& to);
 
 /// Returns the rig seen from a table plane that lies `height_mm` higher: camera and lights by that
-/// much lower, and each field of gains as the light's rays throw it onto the new plane,
+/// much lower, and each field of gains as the light's rays throw its knots onto the new plane:
 ///
 ///     x' = s + (x - s) (s_z - height) / s_z                                                   (1)
 ///
-/// of its knots, which is exact: light and irradiance at a point of space stay the same. Code that
-/// takes the surface to lie in z = 0 then has it at z = height.
+/// This is exact: light and irradiance at a point of space stay the same. Code that takes the
+/// surface to lie in z = 0 then has it at z = height.
 ///
 /// Errors   kBadData: not a number; the camera or a near light is not above the new plane
 [[nodiscard]] Result<Rig> Lifted(Rig rig, double height_mm);

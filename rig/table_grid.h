@@ -14,7 +14,7 @@ namespace sateen {
 /// begins with 16 px between knots and halves that until the middle of every cell is right, which
 /// lenses as strong as k1 = -0.3 need in images smaller than 640 px only.
 ///
-/// Cost     2 ns a pixel, after 0.02 s for 24 Mpx; TablePointOfPixel takes 110 ns
+/// Cost     2 ns per pixel, after 0.02 s for 24 Mpx; TablePointOfPixel takes 110 ns
 class TableGrid {
  public:
   // kBadData where a pixel of the camera does not see the table plane, or the lens bends so much

@@ -38,8 +38,8 @@ class HeightMap final : public Surface {
       }
     }
     // Half-way the cubic's slope is -1/8, 5/4, -1/8 of three neighbouring steps s, at most 1.5 max
-    // |s|; the weights across sum to at most 1.25 in magnitude; two axes. It leaves the range of its
-    // samples by at most 1.25^2 - 1 of it, half on each side.
+    // |s|; the weights across sum to at most 1.25 in magnitude; two axes. It leaves the range of
+    // its samples by at most 1.25^2 - 1 of it, half on each side.
     max_slope_ = 1.5 * 1.25 * std::sqrt(2.0) * step / pitch_mm_;
     const double overshoot = 0.5 * (1.25 * 1.25 - 1.0) * (high - low);
     lowest_mm_ = low - overshoot;

@@ -9,7 +9,8 @@ namespace sateen {
 namespace {
 
 constexpr int kOpticsRows = 16;
-constexpr double kReachInSigma = 4.0;  // of the point spread; beyond lies 6e-5 of it
+// Reach of the point spread; 6e-5 of it lies beyond.
+constexpr double kReachInSigma = 4.0;
 
 // Halves of a Gaussian that sums to 1, from its middle outwards.
 std::vector<float> PointSpread(double sigma_px) {

@@ -7,8 +7,8 @@
 
 namespace sateen {
 
-// What the lens does to radiance on its way to the sensor: the vignetting and the point spread of
-// `lens`. At the border the picture continues as its outermost row or column.
+// Applies the effect of the lens on radiance on its way to the sensor: the vignetting and the point
+// spread of `lens`. At the border the picture continues as its outermost row or column.
 [[nodiscard]] Status ApplyOptics(const Lens& lens, Image3& radiance, const Task& task = {});
 
 }  // namespace sateen

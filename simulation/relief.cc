@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kTwoPi = 2.0 * std::numbers::pi;
 
-// What the sensor reports for `radiance`, as radiance again.
+// Returns the sensor's reading of `radiance`, as radiance again.
 double Sensed(const SensorModel& sensor, double radiance, uint64_t seed, uint64_t sample) {
   const double mean = std::clamp(radiance / sensor.full_scale, 0.0, 4.0) * sensor.electrons;
   const double sigma = std::sqrt(mean + sensor.read_noise_electrons * sensor.read_noise_electrons);
@@ -41,7 +41,7 @@ Eigen::Vector3d NormalAt(const ReliefScene& scene, double u, double v, double pe
       return Eigen::Vector3d::UnitZ();
     case ReliefShape::kDome: {
       const double r = std::hypot(u, v);
-      // Of a cap: the sine of the tilt grows with the radius.
+      // A cap: the sine of the tilt grows with the radius.
       return r > 1.0 ? Eigen::Vector3d::UnitZ()
                      : Tilted({u, v}, std::asin(r * std::sin(scene.max_slope_rad)));
     }

@@ -37,7 +37,7 @@ struct ReliefScene {
   double albedo_min = 0.3;
   double albedo_max = 0.8;
   std::optional<SensorModel> sensor;  // absent: exact, unlimited
-  uint64_t seed = 1;                  // of the sensor's noise
+  uint64_t seed = 1;                  // seed of the sensor's noise
 
   // Names the first field out of range, with its value and its range.
   [[nodiscard]] Status Validate() const;

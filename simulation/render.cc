@@ -17,7 +17,7 @@ namespace {
 
 constexpr int kRenderRows = 8;
 constexpr double kFarAway_mm = 1e6;   // a distant light, for shadows
-constexpr double kBounceStep = 1e-3;  // of the surface's detail; Monte-Carlo error is larger
+constexpr double kBounceStep = 1e-3;  // share of the surface's detail; Monte-Carlo error is larger
 
 // Streams of random numbers that must not meet.
 enum Stream : uint64_t { kFlickerStream = 1, kYarnStream = 2, kBounceStream = 3 };
@@ -118,7 +118,7 @@ Result<SurfaceMaps> MapSurface(const Scene& scene, const Eigen::Vector2d& shift_
   return maps;
 }
 
-// What light does to one pixel of one frame.
+// Computes the light of one pixel of one frame.
 class PixelShader {
  public:
   PixelShader(const Scene& scene, const SurfaceMaps& maps, std::optional<size_t> light)

@@ -10,13 +10,13 @@
 
 namespace sateen {
 
-// What every frame of a scene has in common: where each pixel looks.
+// Maps that all frames of a scene share: where each pixel looks.
 struct SurfaceMaps {
   Image3 point_mm;  // in the table frame
   Image3 normal;    // unit, table frame
-  Image3 albedo;    // of the Lambertian body
+  Image3 albedo;    // albedo of the Lambertian body
   Image<uint8_t> part;
-  Eigen::Vector2d shift_px = Eigen::Vector2d::Zero();  // of a bumped camera
+  Eigen::Vector2d shift_px = Eigen::Vector2d::Zero();  // shift of a bumped camera
 };
 
 struct RenderedFrame {
@@ -38,7 +38,7 @@ struct RenderedFrame {
 /// `bounce_rays` cosine-distributed directions; its error falls as their number ^ -3/4 where light
 /// varies smoothly.
 ///
-/// Cost     O(pixels) a frame; about 40 bytes a pixel beside the frame. The same bits for any
+/// Cost     O(pixels) per frame; about 40 bytes per pixel beside the frame. The same bits for any
 ///          number of threads.
 class SceneRenderer {
  public:

@@ -17,8 +17,8 @@ namespace sateen {
 // kLedField have lens rings of 3 %, each a little wider than the last.
 [[nodiscard]] Lights LedRing(LightModel model, int count, double polar_rad, double radius_mm);
 
-// The scanner of The Order: 1886: ten LEDs on a hemisphere of 600 mm, camera 610 mm above the table that sees
-// `width_mm` of it. flux_rgb is such that irradiance at the origin is 1.
+// The scanner of The Order: 1886: ten LEDs on a hemisphere of 600 mm, and a camera 610 mm above the
+// table that sees `width_mm` of it. flux_rgb is such that irradiance at the origin is 1.
 [[nodiscard]] Rig RingRig(ImageSize size_px, LightModel model = LightModel::kNear,
                           double width_mm = 200.0);
 

@@ -27,8 +27,8 @@ struct WavyAlbedo {
   double max = 0.8;
   double period_mm = 100.0;
 };
-// What is printed on a board or a sheet (targets/print.h), in a plane over the table. On a surface
-// that is another plane, or none, it is seen from above.
+// Albedo of a printed board or sheet (targets/print.h), in a plane over the table. On a surface
+// that is not that plane, the print is seen from above.
 struct PrintAlbedo {
   Print print;
   // Its frame: x right and y up as printed. Any z: a place (x, y) of the table shows what of the
@@ -47,7 +47,7 @@ using Albedo = std::variant<ConstantAlbedo, WavyAlbedo, PrintAlbedo, PatchesAlbe
 
 [[nodiscard]] Eigen::Vector3d AlbedoAt(const Albedo& albedo, double x_mm, double y_mm);
 
-// What one part of a surface is made of: a Lambertian body and, where given, more on top.
+// Material of one part of a surface: a Lambertian body and, where given, more on top.
 struct Material {
   Albedo albedo;
   double yarn_variation = 0.0;           // albedo of each yarn is multiplied by 1 +- this; [0, 1)
@@ -79,7 +79,7 @@ struct Lens {
   Eigen::Vector2d bump_px = Eigen::Vector2d::Zero();
 };
 
-// What a simulated capture is made of. Everything that is not asked for is off.
+// Everything that makes a simulated capture. All that is not asked for is off.
 struct Scene {
   Rig rig;  // with a camera
   SurfacePtr surface;

@@ -18,12 +18,13 @@ namespace sateen {
 ///     DN = round(black + (white - black) f(e' / E)),       0 <= DN <= saturation            (3)
 ///     f(x) = x - c ((x - k) / (1 - k))^2  above the knee k, x below; straight on from x = 1 (4)
 ///
-/// E = full_well_electrons, r = read_noise_electrons, s = sensitivity_rgb, c = compression. So the variance of DN is g^2 (e + r^2) + 1/12,
-/// g = (white - black) / E, below the knee. The shot noise is Gaussian, not Poisson: to 1 % from 30 electrons up.
+/// E = full_well_electrons, r = read_noise_electrons, s = sensitivity_rgb, c = compression. So
+/// below the knee the variance of DN is g^2 (e + r^2) + 1/12, where g = (white - black) / E. The
+/// shot noise is Gaussian, not Poisson: to 1 % from 30 electrons up.
 struct Sensor {
   int bits = 16;              // 12, 14 or 16
   double black_dn = 0.0;      // 0 <= black < white
-  double white_dn = 65535.0;  // what the file calls white; at most 2^bits - 1
+  double white_dn = 65535.0;  // the file's white; at most 2^bits - 1
   // Where it saturates; black < saturation <= white. Absent: at white.
   std::optional<double> saturation_dn = std::nullopt;
   std::array<uint8_t, 4> cfa = {0, 1, 1,
@@ -48,7 +49,8 @@ struct Sensor {
 // The four Bayer orders by their first two by two sites: "RGGB", "GRBG", "GBRG", "BGGR".
 [[nodiscard]] std::optional<std::array<uint8_t, 4>> BayerNamed(std::string_view name);
 
-// What the sensor reads of linear radiance. Each site's noise depends on `seed` and its place alone.
+// Returns the sensor's readings of linear radiance. Each site's noise depends on `seed` and its
+// place alone.
 [[nodiscard]] Result<Image<uint16_t>> Expose(const Sensor& sensor, const Image3& radiance,
                                              uint64_t seed, const Task& task = {});
 

@@ -59,7 +59,7 @@ class SphereCap final : public Surface {
  private:
   double radius_mm_;
   double edge_rad_;
-  double base_mm_;  // of the table plane above the centre
+  double base_mm_;  // height of the table plane above the centre
 };
 
 class Groove final : public Surface {

@@ -11,7 +11,7 @@
 
 namespace sateen {
 
-// What lies at one place of a surface.
+// Height, slope and material at one place of a surface.
 struct SurfacePoint {
   double height_mm = 0.0;
   Eigen::Vector2d slope = Eigen::Vector2d::Zero();  // dz/dx, dz/dy
@@ -24,7 +24,7 @@ struct SurfacePoint {
 
 /// A height field z(x, y) over the table, in millimetres, with its slope in closed form.
 ///
-/// |grad z| <= MaxSlope() everywhere, which is what makes a ray search safe: see simulation/trace.h.
+/// |grad z| <= MaxSlope() everywhere. That makes a ray search safe: see simulation/trace.h.
 class Surface {
  public:
   Surface() = default;

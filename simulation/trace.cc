@@ -10,10 +10,10 @@ constexpr int kMaxTraceSteps = 10000;
 constexpr int kNewtonSteps = 8;
 constexpr double kTouching_mm = 1e-10;
 constexpr double kFarthest_mm = 1e6;  // beyond it, a ray looks past a plane that is tilted
-constexpr double kShadowEdge = 1e-5;  // of the detail
+constexpr double kShadowEdge = 1e-5;  // share of the detail
 
 struct Gap {
-  double height_mm;  // of the ray above the surface
+  double height_mm;  // height of the ray above the surface
   double rate;       // its derivative along the ray
 };
 

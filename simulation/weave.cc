@@ -9,9 +9,9 @@ namespace sateen {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
-constexpr int kMeanSamples = 240;  // a side of the repeat
+constexpr int kMeanSamples = 240;  // along a side of the repeat
 
-// Of a yarn's section, equation (1) without its centre line.
+// Section of a yarn, equation (1) without its centre line.
 struct Section {
   double half_width_mm;
   double radius_mm;
@@ -209,7 +209,7 @@ class Knit final : public Textile {
  private:
   static constexpr double kCourse = 0.8;       // height of a loop over the column's pitch
   static constexpr double kYarnWidth = 0.46;   // at fill 1
-  static constexpr double kBottomPlace = 0.1;  // of a leg from the middle, in pitches
+  static constexpr double kBottomPlace = 0.1;  // distance of a leg from the middle, in pitches
   static constexpr double kTopPlace = 0.32;
   static constexpr double kSpan = 1.7;  // length of a leg in loops
 

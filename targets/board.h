@@ -46,8 +46,9 @@ struct BoardSpec {
 /// "charuco:10x7:25mm:18mm:DICT_5X5_250:legacy"   and, each optional, dictionary and old pattern
 ///
 /// The dictionary is DICT_4X4_50, or the smallest of the same kind that has enough markers.
-/// Errors   kInvalidArgument: another form; fewer than 3 x 3 squares or more than 100 x 100; lengths
-///          that are not positive; a marker that does not fit its square; too small a dictionary
+/// Errors   kInvalidArgument: another form; fewer than 3 x 3 squares or more than 100 x 100;
+///          lengths that are not positive; a marker that does not fit its square; too small a
+///          dictionary
 [[nodiscard]] Result<BoardSpec> ParseBoardSpec(std::string_view text);
 
 }  // namespace sateen

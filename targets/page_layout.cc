@@ -19,7 +19,7 @@ constexpr double kSlackMm = 1e-6;
 constexpr std::array kPapersBySize = {"letter", "A4", "A3", "A2"};
 constexpr std::array kRulersMm = {100.0, 50.0};
 
-// What a print may take of a paper.
+// Returns the room that a print may take on a paper.
 Eigen::Vector2d RoomMm(const Eigen::Vector2d& paper_mm, bool is_sheet) {
   return is_sheet ? paper_mm
                   : Eigen::Vector2d(paper_mm.x() - 2.0 * kPageMarginMm,

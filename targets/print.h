@@ -11,7 +11,7 @@
 
 namespace sateen {
 
-/// What a printer makes of a board or a sheet: black boxes on white paper. Its frame is the
+/// A board or a sheet as a printer prints it: black boxes on white paper. Its frame is the
 /// target's: millimetres, origin at the centre, x right, y up.
 class Print {
  public:
@@ -40,8 +40,8 @@ class Print {
 [[nodiscard]] Print PrintOf(const BoardSpec& spec);
 [[nodiscard]] Print PrintOf(const SheetBorder& border);
 
-// Of the target that `spec` names: "sheet:..." as ParseSheetBorder() reads it, or a board as
-// ParseBoardSpec() does. Errors as theirs.
+// Returns the print of the target that `spec` names: "sheet:..." as ParseSheetBorder() reads it, or
+// a board as ParseBoardSpec() does. Fails as they do.
 [[nodiscard]] Result<Print> PrintNamed(std::string_view spec);
 
 }  // namespace sateen

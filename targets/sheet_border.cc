@@ -12,11 +12,11 @@ namespace {
 
 constexpr double kMarginMm = 5.0;          // which printers leave white
 constexpr double kLeastGap = 0.4;          // between markers, of their side
-constexpr double kLeastBlank = 1.0 / 3.0;  // of the paper, each way
+constexpr double kLeastBlank = 1.0 / 3.0;  // share of the paper, each way
 constexpr double kSmallestMarkerMm = 2.0;
 constexpr int kFewestAlongASide = 3;
 constexpr int kBits = 4;
-constexpr double kQuiet = 1.0 / 6.0;  // of a marker: white about it
+constexpr double kQuiet = 1.0 / 6.0;  // share of a marker: white about it
 
 // Markers along a side, and the distance of their centres.
 struct Row {

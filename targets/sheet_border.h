@@ -16,10 +16,10 @@ namespace sateen {
 /// Markers stand 5 mm from the paper's edges, which printers leave white, at least 0.4 of a marker
 /// apart, with ids 0, 1, ... clockwise from the top left corner.
 struct SheetBorder {
-  Eigen::Vector2d size_mm = Eigen::Vector2d::Zero();  // of the paper
+  Eigen::Vector2d size_mm = Eigen::Vector2d::Zero();  // size of the paper
   double marker_mm = 0.0;
   std::string dictionary = {};
-  std::string paper = {};  // as it was named: "A4"; a size where it was none
+  std::string paper = {};  // as it was named: "A4"; a size where it has no name
 
   // As ParseSheetBorder() reads it.
   [[nodiscard]] std::string Text() const;

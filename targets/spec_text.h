@@ -11,7 +11,7 @@ namespace sateen {
 // The parts of "charuco:10x7:25mm:18mm" between its colons.
 [[nodiscard]] std::vector<std::string_view> FieldsOf(std::string_view text);
 
-// The whole of `text` as a number; false where it is none.
+// Reads the whole of `text` as a number; false if it is not a number.
 template <typename T>
 [[nodiscard]] bool ReadWhole(std::string_view text, T& number) {
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);

@@ -8,7 +8,7 @@
 namespace sateen {
 
 // Image shrunk by a whole factor to at most `max_width`, from bands of its rows. Each pixel is the
-// mean of the known pixels of its square; zero where there is none.
+// mean of the known pixels of its square; zero if none is known.
 class Thumbnail {
  public:
   Thumbnail(ImageSize size_px, int max_width, size_t channels);

@@ -11,7 +11,7 @@ namespace sateen::ptp {
 // A setting of the virtual camera, as PTP's device properties are.
 struct Property {
   uint16_t code = 0;
-  size_t size = 2;  // of its value: UINT8, UINT16 or UINT32 [bytes]
+  size_t size = 2;  // bytes of its value: UINT8, UINT16 or UINT32
   bool writable = true;
   uint64_t value = 0;
   std::vector<uint64_t> choices;  // any value, where empty
@@ -20,7 +20,7 @@ struct Property {
   [[nodiscard]] std::string Description() const;
 };
 
-// What the virtual camera gives itself out for.
+// The camera that the virtual camera imitates.
 struct Persona {
   std::string name;
   std::string manufacturer;
@@ -31,11 +31,12 @@ struct Persona {
   std::vector<Property> properties;
   // The one that the exposure is taken from, and how.
   uint16_t exposure_property = 0;
-  std::string folder;       // of its files, below DCIM
+  std::string folder;       // folder of its files, below DCIM
   std::string file_prefix;  // "SCAN" of SCAN0001.DNG
 
   [[nodiscard]] std::string DeviceInfo() const;
-  // Of the exposure property's value: 0.1 ms units, or a ratio of two 16-bit numbers. [s]
+  // Returns the exposure time [s] for the exposure property's value: 0.1 ms units, or a ratio of
+  // two 16-bit numbers.
   [[nodiscard]] double ExposureSeconds(uint64_t value) const;
 };
 

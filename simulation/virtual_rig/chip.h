@@ -27,17 +27,17 @@ struct ChipPin {
   friend bool operator==(const ChipPin&, const ChipPin&) = default;
 };
 
-// What of the cause of a reset the firmware sees behind a boot loader, which clears MCUSR: Optiboot
-// from version 5 on leaves it in register r2, others leave nothing.
+// How much of a reset's cause the firmware learns behind a boot loader, which clears MCUSR.
+// Optiboot from version 5 on leaves the cause in register r2; others leave nothing.
 enum class BootLoader : uint8_t { kNone, kTellsInR2, kTellsNothing };
 
 // An ATmega328P at 16 MHz that runs a firmware image, as libsimavr simulates it. Deterministic: the
 // same calls give the same bytes and pins at the same simulated time, and nothing depends on the
 // wall clock.
 //
-// What libsimavr leaves out is added here, because lights hang on it: outputs are released at every
-// reset (it clears the registers and tells nobody), MCUSR tells the cause, time goes on without
-// power, and bytes arrive one after the other at the speed of the line.
+// Behaviour missing from libsimavr is added here, because the lights depend on it: outputs are
+// released at every reset (it clears the registers and tells nobody), MCUSR tells the cause, time
+// goes on without power, and bytes arrive one after the other at the speed of the line.
 //
 // Not simulated: the code of a boot loader (the image starts at the reset vector), analogue inputs,
 // the drift of clock and watchdog oscillator, framing errors. A byte takes 11 bit times, not 10.
@@ -64,12 +64,12 @@ class Chip {
   void RunUntil(SimTime time);
 
   // Puts a byte on the line, behind those that are under way. It is lost where the chip is off or
-  // held in reset, where the receiver is off, and where the firmware does not read for 16 byte times
-  // (a real one waits for two; libsimavr is too slow to tell).
+  // held in reset, where the receiver is off, and where the firmware does not read for 16 byte
+  // times (a real one waits for two; libsimavr is too slow to tell).
   void Receive(uint8_t byte);
   [[nodiscard]] size_t BytesUnderWay() const;
   [[nodiscard]] uint64_t BytesLost() const;
-  // Bits a second as the firmware has set them.
+  // Returns the bits per second that the firmware has set.
   [[nodiscard]] double BaudRate() const;
 
   // Whether the pin is an output and high.
@@ -83,8 +83,9 @@ class Chip {
   void Reset(ResetCause cause);
   // From the next reset on.
   void PutBehind(BootLoader boot_loader);
-  // Held in reset for `duration`, with RAM as it is; then it starts. What a low supply voltage does,
-  // and, as far as the outputs see it, a boot loader that waits for a programmer.
+  // Holds the chip in reset for `duration`, with RAM as it is; then it starts. A low supply voltage
+  // does this, and, as far as the outputs see it, so does a boot loader that waits for a
+  // programmer.
   void HoldInReset(SimTime duration, ResetCause cause);
   // Time goes on, nothing runs, all outputs are released, bytes are lost.
   void PowerOff();

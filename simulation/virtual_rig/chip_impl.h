@@ -1,6 +1,6 @@
 #pragma once
 
-// What of Chip knows libsimavr; for chip.cc and chip_impl.cc alone.
+// The part of Chip that knows libsimavr; for chip.cc and chip_impl.cc alone.
 #include <simavr/avr_eeprom.h>
 #include <simavr/avr_ioport.h>
 #include <simavr/avr_uart.h>
@@ -35,7 +35,7 @@ struct Chip::Impl {
   avr_irq_t* receiver = nullptr;
   void (*reset_of_model)(avr_t*) = nullptr;
   Events events;
-  uint64_t cycles_off = 0;  // that passed while it did not run
+  uint64_t cycles_off = 0;  // cycles that passed while it did not run
   bool has_power = true;
   struct Start {
     uint64_t cycle;
@@ -45,7 +45,7 @@ struct Chip::Impl {
   BootLoader boot_loader = BootLoader::kNone;
   // Causes of the resets so far that the firmware has not cleared.
   uint8_t mcusr = 0;
-  // What the reset that is going on is called; the watchdog's come by themselves.
+  // Cause of the reset under way; the watchdog's come by themselves.
   ResetCause cause = ResetCause::kWatchdog;
   std::array<Port, kChipPorts.size()> ports = {};
   std::deque<uint8_t> line;

@@ -14,7 +14,7 @@ namespace sateen {
 struct LineStressOptions {
   uint64_t commands = 10'000;
   LineFaults faults = {.drop = 1e-3, .flip = 1e-3, .insert = 1e-3};
-  // Of the choice of commands; the line has its own in `faults`.
+  // Seed of the choice of commands; the line has its own in `faults`.
   uint64_t seed = 1;
 };
 
@@ -23,9 +23,9 @@ struct LineStressResult {
   uint64_t done = 0;
   uint64_t reported_failed = 0;
   uint64_t reconnects = 0;
-  // What must be none. A light went on that the command under way did not ask for, or at another
-  // level; or a command was reported done and the lights were not as its answer said, or not as it
-  // had asked.
+  // Counts that must be 0. wrong_light: a light went on that the command under way did not ask for,
+  // or at another level. wrong_answer: a command was reported done and the lights were not as its
+  // answer said, or not as it had asked.
   uint64_t wrong_light = 0;
   uint64_t wrong_answer = 0;
   uint64_t over_time = 0;  // lights that were on for longer than the limit
@@ -37,10 +37,10 @@ struct LineStressResult {
   SimTime simulated{};
 };
 
-/// LightBoard and the real firmware at the two ends of a line that loses, flips and invents bytes.
-/// Random commands (six in ten set a light, two turn all off, two ask for a report), one after the
-/// other; after a command that was reported failed the host connects again. The virtual board is the
-/// witness of what really shone.
+/// Runs LightBoard and the real firmware at the two ends of a line that loses, flips and invents
+/// bytes. Sends random commands one after the other: six in ten set a light, two turn all off, two
+/// ask for a report. After a command that was reported failed the host connects again. The virtual
+/// board is the witness of what really shone.
 ///
 /// Errors  kDevice, kTimeout: the host cannot connect at all; kCancelled
 /// Cost    about 0.3 ms of one core for each command

@@ -12,8 +12,8 @@
 
 namespace sateen {
 
-/// What lies under the virtual camera, as the camera sees it under each light alone: light is
-/// additive, so every frame is a sum of these pictures. One value a site of the sensor:
+/// The scene under the virtual camera, as the camera sees it under each light alone. Light is
+/// additive, so every frame is a sum of these pictures. One value per site of the sensor:
 ///
 ///     v(x, y) = s_c i_c(x, y) / full_scale,    c the colour of the site, i radiance          (1)
 ///
@@ -22,13 +22,13 @@ struct LitScene {
   std::string folder;
   Rig rig;
   std::vector<Image<float>> lights;  // in the order of the rig's, without ambient light
-  Image<float> ambient;              // what the camera sees with all lights off
+  Image<float> ambient;              // picture with all lights off
 };
 
 /// Reads a session of linear frames, as `sateen simulate SCENE --linear -o DIR` writes it: one
 /// frame of each light, and dark frames, whose mean is the ambient light and is in every lit frame.
 ///
-/// Memory   4 bytes a site for each light and once more; 12 a site besides while a frame is read,
+/// Memory   4 bytes per site for each light and once more; 12 per site besides while a frame is read,
 ///          on each thread
 /// Errors   kIo: a file is absent or unreadable
 ///          kBadData: a file that is not what the session recorded; RAW or other frames that are

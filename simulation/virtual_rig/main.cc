@@ -81,7 +81,7 @@ Result<std::vector<std::string>> LightNames(const RigArgs& args, int lights) {
   return names;
 }
 
-// What a program is started with that shall take the virtual board for a serial port.
+// Returns the environment in which a program takes the virtual board for a serial port.
 Result<RigLoop::Environment> PreloadEnvironment(const VirtualPort& port) {
   const fs::path preload =
       FindBeside({"libsateen-virtual-port.so", "../lib/sateen/libsateen-virtual-port.so"});
@@ -206,7 +206,7 @@ Result<int> RunRig(const RigArgs& args, const std::string& firmware, RigLoop& lo
   }
   Result<int> status = args.command.empty() ? Serve(loop, commands, environment)
                                             : RunCommand(args, loop, commands, environment);
-  commands.Step();  // what the camera has said
+  commands.Step();  // events that the camera has posted
   loop.End();
   return status;
 }

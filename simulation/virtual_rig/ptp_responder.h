@@ -29,7 +29,7 @@ class PtpResponder {
   // Ends all connections.
   ~PtpResponder();
 
-  // What libgphoto2 finds it by.
+  // Returns the port by which libgphoto2 finds it.
   [[nodiscard]] std::string PortName() const;
   [[nodiscard]] VirtualCamera& Camera() { return *camera_; }
 

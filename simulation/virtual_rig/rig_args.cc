@@ -28,7 +28,7 @@ constexpr const char* kFooter =
     "  sateen-virtual-rig run --scene twill -- sateen devices\n"
     "Exit status: as that of sateen; with `run` that of the command.";
 
-// Of options that come before the subcommand or after it.
+// Adds options that may come before the subcommand or after it.
 void AddOptions(CLI::App& app, RigArgs& args) {
   app.add_option("--rig", args.rig, "Rig file; names the lights in the events");
   app.add_option("--lights", args.lights, "Lights of the board, 14 or 16")

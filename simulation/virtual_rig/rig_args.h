@@ -8,7 +8,7 @@
 
 namespace sateen {
 
-// What the program sateen-virtual-rig is started with.
+// Arguments of the program sateen-virtual-rig.
 struct RigArgs {
   std::string rig;
   std::string firmware;  // empty: ours for as many lights

@@ -62,7 +62,7 @@ Result<std::unique_ptr<RigCamera>> RigCamera::Start(const RigCameraOptions& opti
     commands.Post([&loop, event = ExposureEvent(frame)] { loop.Say(event); });
   });
   auto frame = [&commands, view = camera->scene_.get()](const FrameRequest& request) {
-    setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), kNiceOfFrames);  // of this thread alone
+    setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), kNiceOfFrames);  // this thread alone
     Result<std::string> bytes = view->Frame(request);
     if (!bytes) {
       commands.Failed(bytes.error());

@@ -18,11 +18,11 @@ struct RigCameraOptions {
   std::string scene;              // folder of a session of linear frames
   std::string persona = "nikon";  // or "generic"
   std::string sensor;             // its name; empty: the scene's rig's response, else "nikon-d5100"
-  std::optional<double> black_dn;  // what it reads in the dark, instead of the sensor's own
+  std::optional<double> black_dn;  // reading in the dark, instead of the sensor's own
   // Radiance that reads as white at 1/50 s, f/8 and ISO 100.
   double full_scale = 1.5;
   double ambient = 1.0;  // times the scene's
-  // Time constant of a light's going on and off.
+  // Time constant with which a light goes on and off.
   std::chrono::nanoseconds rise = std::chrono::milliseconds(1);
 };
 
@@ -38,7 +38,7 @@ class RigCamera {
   RigCamera& operator=(const RigCamera&) = delete;
   ~RigCamera();
 
-  // What libgphoto2 finds it by.
+  // Returns the port by which libgphoto2 finds it.
   [[nodiscard]] std::string PortName() const { return responder_->PortName(); }
 
  private:

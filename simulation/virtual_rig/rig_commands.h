@@ -39,9 +39,9 @@ class RigCommands {
   void Failed(const Error& error) const { failed_(error); }
   // The capture of this number is asked for. Any thread.
   void CaptureAsked(int number);
-  // To be done by the loop's thread. Any thread.
+  // Hands `action` to the loop's thread. May be called from any thread.
   void Post(std::function<void()> action, Clock::time_point due = Clock::now());
-  // What is due, in the order of time.
+  // Runs the actions that are due, in the order of time.
   void Step();
 
  private:

@@ -23,11 +23,11 @@ struct RigLoopOptions {
   bool opening_resets = false;
   // Where events go, one JSON object a line; nowhere if null.
   std::FILE* events = nullptr;
-  // Told by the wall clock what the lights do, where there is one.
+  // Log that is told by the wall clock what the lights do; null: none.
   LightLog* light_log = nullptr;
 };
 
-// What RigLoop::Parse() understands, for people.
+// Commands that RigLoop::Parse() understands, for people.
 inline constexpr std::string_view kBoardCommands =
     "reset, unplug, plug, brown-out [MS], flash [MS]";
 
@@ -47,7 +47,7 @@ class RigLoop {
   RigLoop& operator=(const RigLoop&) = delete;
   ~RigLoop() { board_.Unwatch(watch_); }
 
-  // What a program is started with that shall find the board; told in the first event.
+  // Environment in which a program finds the board; told in the first event.
   using Environment = std::map<std::string, std::string>;
 
   void Start(const std::string& firmware, const Environment& environment);

@@ -78,7 +78,7 @@ class SceneCamera {
 
   const Sensor sensor_;
   const LightLog& lights_;
-  const Rig rig_;  // of every scene
+  const Rig rig_;  // rig of every scene
   const std::string first_folder_;
   std::atomic<bool> ends_ = false;
 
@@ -90,11 +90,11 @@ class SceneCamera {
   // Channel -> the channels whose lights it lights, as the rig has them; the same one may be there
   // twice.
   std::map<int, std::vector<int>> wiring_;
-  std::map<int, double> factors_;  // of the lights that are not 1
+  std::map<int, double> factors_;  // factors other than 1, by light
   double ambient_ = 1.0;
   double shift_x_px_ = 0.0;
   double shift_y_px_ = 0.0;
-  std::vector<std::pair<PictureShade, int>> shades_;  // and for how many frames yet
+  std::vector<std::pair<PictureShade, int>> shades_;  // with the number of frames left
   std::thread reader_;
 };
 

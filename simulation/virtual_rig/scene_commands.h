@@ -12,7 +12,7 @@
 
 namespace sateen {
 
-// What ParseSceneCommand() understands, for people.
+// Commands that ParseSceneCommand() understands, for people.
 inline constexpr std::string_view kSceneCommands =
     "scene DIR, camera FAULT [N], ambient FACTOR, nudge DX DY, swap A B, double A B, "
     "light K FACTOR, shade X Y RADIUS FACTOR [N]";

@@ -18,10 +18,10 @@ struct PictureShade {
   friend bool operator==(const PictureShade&, const PictureShade&) = default;
 };
 
-// All that decides about a frame of a scene.
+// Everything that determines a frame of a scene.
 struct FrameState {
-  std::vector<double> shares;  // of each light of the scene, of its full light; w_k below
-  double ambient = 1.0;        // of the scene's; a below
+  std::vector<double> shares;  // share of full light, per light of the scene; w_k below
+  double ambient = 1.0;        // factor on the scene's; a below
   double exposure = 1.0;       // H / H_ref
   // By how much the picture has moved to the right and down.
   double shift_x_px = 0.0;
@@ -29,7 +29,7 @@ struct FrameState {
   std::vector<PictureShade> shades;
 };
 
-/// A frame of the scene as the sensor reads it. Of the pictures v of LitScene, (1) there:
+/// Returns a frame of the scene as the sensor reads it. With the pictures v of LitScene, (1) there:
 ///
 ///     x = (H / H_ref) (sum_k w_k v_k + a v_ambient)                                          (1)
 ///     x' = x(p - shift), between the sites of one phase of the Bayer pattern bilinearly,

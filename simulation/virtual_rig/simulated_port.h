@@ -10,7 +10,7 @@
 
 namespace sateen {
 
-// What a bad cable does to each byte, in both directions: the probabilities that it is lost, that
+// Faults of a bad cable, per byte and in both directions: the probabilities that it is lost, that
 // one bit of it is flipped, and that a random byte comes before it.
 struct LineFaults {
   double drop = 0;
@@ -21,9 +21,9 @@ struct LineFaults {
   [[nodiscard]] Status Validate() const;
 };
 
-// The virtual board's serial port inside one program, for LightBoard: what is waited for here passes
-// in simulated time, so that a test is deterministic and does not wait. Unplugging the board loses
-// the port until it is opened again, however soon the board is plugged in.
+// The virtual board's serial port inside one program, for LightBoard. Waiting passes simulated
+// time, so that a test is deterministic and does not wait. Unplugging the board loses the port
+// until it is opened again, however soon the board is plugged in.
 class SimulatedPort : public BytePort {
  public:
   // `board` must outlive the port. `opening_resets`: as on an Uno, opening the port resets the

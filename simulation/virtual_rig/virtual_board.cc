@@ -14,7 +14,7 @@ constexpr SimTime kShortestBreak = std::chrono::microseconds(100);
 // pins.h names ports as the firmware's macros need them: B, not 'B'.
 #define SATEEN_PIN(port, bit) \
   ChipPin { (#port)[0], bit }
-#define SATEEN_PIN_OF(port, bit) SATEEN_PIN(port, bit)  // what a macro stands for, not its name
+#define SATEEN_PIN_OF(port, bit) SATEEN_PIN(port, bit)  // expands a macro given as argument
 #define SATEEN_LIGHT_PIN(channel, port, bit, arduino) SATEEN_PIN(port, bit),
 
 BoardWiring WiringOf14() {

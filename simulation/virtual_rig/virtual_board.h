@@ -15,7 +15,7 @@
 
 namespace sateen {
 
-// What of the board hangs on which pin; docs/rig.md, "Wiring".
+// Pins of the board's parts; docs/rig.md, "Wiring".
 struct BoardWiring {
   std::vector<ChipPin> lights;  // enable input of light k's driver; high is on
   ChipPin dimming;              // dimming input of all drivers, driven by a timer's compare unit
@@ -35,8 +35,8 @@ struct LightChange {
   double level;
 };
 
-// What a light has done since ClearRecords(). A break of less than 0.1 ms, as while its level
-// changes, is none.
+// Record of a light since ClearRecords(). A break of less than 0.1 ms, as while its level changes,
+// does not count.
 struct ChannelRecord {
   SimTime longest_on{};  // the longest time that it was on without a break, until now
   double highest_level = 0;
@@ -74,7 +74,7 @@ class VirtualBoard {
   bool RunUntil(const std::function<bool()>& done, SimTime limit,
                 SimTime step = std::chrono::microseconds(50));
 
-  // Calls `action` when the simulated time has come, within Run...(): what happens to the board while
+  // Calls `action` when the simulated time has come, within Run...(): for events on the board while
   // somebody waits for it.
   void At(SimTime time, std::function<void()> action) { actions_.emplace(time, std::move(action)); }
 
@@ -90,7 +90,7 @@ class VirtualBoard {
   void ClearRecords();
 
   void Reset(ResetCause cause = ResetCause::kExternal) { chip_->Reset(cause); }
-  // What opening the port does on an Uno: a reset, and a boot loader that takes its time.
+  // Resets as opening the port does on an Uno, with a boot loader that takes its time.
   void ResetByHost(SimTime boot_loader) { chip_->HoldInReset(boot_loader, ResetCause::kExternal); }
   // The supply voltage is too low for as long.
   void BrownOut(SimTime duration) { chip_->HoldInReset(duration, ResetCause::kBrownOut); }

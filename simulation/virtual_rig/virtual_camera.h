@@ -19,9 +19,9 @@
 
 namespace sateen {
 
-// What a frame of the virtual camera is to show.
+// Settings and times of a frame that the virtual camera is to show.
 struct FrameRequest {
-  int number = 0;  // of the frame, from 1
+  int number = 0;  // number of the frame, from 1
   double exposure_s = 0.0;
   double f_number = 0.0;
   double iso = 0.0;
@@ -33,7 +33,7 @@ struct FrameRequest {
 // The bytes of the RAW file. Called from a thread of the camera when the shutter has closed.
 using FrameSource = std::function<Result<std::string>(const FrameRequest&)>;
 
-// What goes wrong with one capture.
+// Faults of one capture.
 enum class CameraFault {
   kNone,
   kBusy,            // the camera answers that it is busy and takes nothing
@@ -63,15 +63,15 @@ struct VirtualCameraOptions {
   std::function<void(int number)> asked = {};
 };
 
-// What the camera has lived through.
+// Counts of what the camera has been through.
 struct CameraReport {
   int captures = 0;  // frames exposed
   int deleted = 0;   // files deleted by the host
   int on_card = 0;
-  int sessions = 0;  // that hosts have opened
+  int sessions = 0;  // sessions that hosts have opened
 };
 
-// What a camera does, without its wire: properties, files, exposures. ptp_responder.h connects it.
+// Behaves as a camera without its wire: properties, files, exposures. ptp_responder.h connects it.
 // All calls may come from any thread.
 class VirtualCamera {
  public:

@@ -24,7 +24,7 @@ constexpr const char* kTty = "ttyACM0";
 // Receivers of UARTs tell bits apart up to about four per cent.
 constexpr double kSpeedTolerance = 0.04;
 
-// What a receiver at another speed makes of a byte: not the byte, and the same each time.
+// Returns the byte as a receiver at another speed reads it: wrong, and the same each time.
 uint8_t Garble(uint8_t byte) { return static_cast<uint8_t>(byte << 1 ^ byte >> 3 ^ 0x5A); }
 
 Status Describe(const fs::path& folder, const UsbIdentity& identity) {

@@ -11,8 +11,8 @@
 
 namespace sateen {
 
-// What the virtual board shows of itself on its USB: an Arduino Uno. Change the serial number to tell
-// two apart.
+// Identity that the virtual board shows on its USB: an Arduino Uno. Change the serial number to
+// tell two apart.
 struct UsbIdentity {
   std::string vendor_id = "2341";
   std::string product_id = "0043";
@@ -45,7 +45,7 @@ class VirtualPort {
   // The name of the pseudo terminal; empty while unplugged.
   [[nodiscard]] const std::string& Terminal() const { return terminal_; }
   [[nodiscard]] const std::filesystem::path& Folder() const { return folder_; }
-  // What a program under port_preload.c calls it.
+  // Returns the board's name for a program under port_preload.c.
   [[nodiscard]] std::string Name() const { return "/dev/ttyACM0"; }
 
   Status Plug();

@@ -96,7 +96,7 @@ TEST(FitChange, StandardDeviationsAreThoseOfTheErrors) {
       "errors over standard deviations: flux {:.3f}, move {:.3f}, turn {:.3f}, camera {:.3f}\n",
       flux.Ratio(), moved.Ratio(), turned.Ratio(), of_camera.Ratio());
   EXPECT_NEAR(flux.Ratio(), 1.0, 0.04);
-  EXPECT_NEAR(moved.Ratio(), 1.0, 0.09);  // of 600 figures
+  EXPECT_NEAR(moved.Ratio(), 1.0, 0.09);  // from 600 figures
   EXPECT_NEAR(turned.Ratio(), 1.0, 0.11);
   EXPECT_NEAR(of_camera.Ratio(), 1.0, 0.11);
 }

@@ -117,8 +117,8 @@ TEST(FitField, ExplainsALensThatNearAndLedDoNot) {
   EXPECT_LT(WorstIrradiance(fit.light, truth, samples), 1e-3);
 }
 
-// One flat sheet does not tell the position, so the light stays near the ruler, and all of the sheet
-// is explained.
+// One flat sheet does not tell the position, so the light stays near the ruler, and all of the
+// sheet is explained.
 TEST(FitField, OneFlatSheetLeavesTheLightWithTheRuler) {
   const Light truth = RingedLed();
   const std::vector<SheetSample> samples = SamplesOf(FullCamera(), truth, 1, 22);
@@ -148,7 +148,7 @@ TEST(FitField, TheGainIsOneInTheMean) {
     mean += fit.light.field.At(ShadowOnTable(fit.light.position_mm, sample.point_mm)) /
             static_cast<double>(samples.size());
   }
-  EXPECT_NEAR(mean, 1.0, 1e-4);  // of those that were used
+  EXPECT_NEAR(mean, 1.0, 1e-4);  // mean over the samples that were used
 }
 
 TEST(FitField, NoLightGetsAFieldThatItDoesNotNeed) {

@@ -45,12 +45,12 @@ TEST(CalibrateLens, NoiselessViewsGiveTheLensBack) {
 }
 
 struct Errors {
-  double distortion_over_sd = 0.0;  // of the five terms of distortion, as over_sd
+  double distortion_over_sd = 0.0;  // the five terms of distortion, as over_sd
   double focal = 0.0;               // relative, worst of fx and fy over the runs
   double principal_px = 0.0;        // worst of cx and cy
-  double over_sd = 0.0;    // root mean square of the four errors over their standard deviations
-  double corner_px = 0.0;  // of the displacement by distortion, root mean square over the corners
-  double corner_sd_px = 0.0;  // what the fits say of that, the worst corner
+  double over_sd = 0.0;       // root mean square of the four errors over their standard deviations
+  double corner_px = 0.0;     // displacement by distortion, root mean square over the corners
+  double corner_sd_px = 0.0;  // standard deviation of it by the fits, the worst corner
 };
 
 // Four lenses from 20 views each, 0.1 px of noise.

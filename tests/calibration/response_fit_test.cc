@@ -267,7 +267,7 @@ TEST(ResponseFit, AnUnevenPatchIsLeftOutAndNamed) {
   for (const size_t dusty : {size_t{0}, size_t{2}}) {  // the first is saturated in many frames
     Bench bench;
     bench.shading = [&](size_t patch, int x, int y) {
-      const double speck = patch == dusty && x < 6 && y < 6 ? 0.8 : 1.0;  // of dust
+      const double speck = patch == dusty && x < 6 && y < 6 ? 0.8 : 1.0;  // a speck of dust
       return speck * (1.0 + 0.004 * x - 0.003 * y);
     };
     const ResponseFit fit = MustFit(bench);

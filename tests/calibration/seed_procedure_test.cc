@@ -89,7 +89,7 @@ TEST(Flatness, TrueLightsSolveFlatToTheNoise) {
   fmt::print("true lights: worst {:.2e} deg over {} tiles\n", flat.worst_rad / kRadPerDeg,
              flat.tiles);
   EXPECT_EQ(flat.tiles, 12 * 8);                  // 300 x 198 mm
-  EXPECT_LT(flat.worst_rad / kRadPerDeg, 0.003);  // of 25 blocks whose normal has 0.004 degrees
+  EXPECT_LT(flat.worst_rad / kRadPerDeg, 0.003);  // 25 blocks whose normal has 0.004 degrees
   EXPECT_GT(flat.rms_rad, 0.0);
   EXPECT_LE(flat.rms_rad, flat.worst_rad);
 }
@@ -143,7 +143,7 @@ TEST(Flatness, DustDoesNotCountAndASheetUnseenIsAnError) {
               HasSubstr("tile_mm = 0; need a number > 0"));
 }
 
-// The start: one intensity a light cannot follow the fall-off over distance.
+// The start: one intensity per light cannot follow the fall-off over distance.
 TEST(SeedProcedure, OneIntensityALightLeavesManyDegrees) {
   const TwoSheets sheets(0.0);
   std::vector<Eigen::Vector3d> intensity;

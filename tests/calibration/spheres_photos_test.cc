@@ -120,8 +120,8 @@ double MissDeg(const std::array<Probe, 2>& probes, bool marked, bool medians) {
 
 // With the published definition of the highlight: the published answers again, from the circles
 // marked by hand to the rounding of a pixel (0.22 degrees), and from the found ones within the bar.
-// Every bright spot counts in that definition: the lamp's image in the other sphere pulls the median
-// by 2 px. So ours differs, and its rays meet better.
+// Every bright spot counts in that definition: the lamp's image in the other sphere pulls the
+// median by 2 px. So ours differs, and its rays meet better.
 TEST(SpheresPhotos, HarvardDirections) {
   SATEEN_NEEDS_DATA("harvard-psd");
   for (const char* object : {"cat", "frog"}) {

@@ -212,8 +212,9 @@ TEST(StandardDeviations, OfACamerasPose) {
     Vector6d errors;
     errors << turn.angle() * turn.axis(),
         fit.table_from_camera.translation() - truth.table_from_camera.translation();
-    // A turn about z is tied to the others, so the covariance has a rank of 5. Rotation and position
-    // are compared alone, and added as they move the place on the table that the camera sees.
+    // A turn about z is tied to the others, so the covariance has a rank of 5. Rotation and
+    // position are compared alone, and added as they move the place on the table that the camera
+    // sees.
     for (Eigen::Index i = 0; i < 6; ++i) {
       each.Add(errors[i], std::sqrt(fit.covariance(i, i)));
     }

@@ -30,10 +30,10 @@ struct Bench {
   int repeats = 2;
   size_t lights = 1;
   uint64_t seed = 1000;
-  double dn_per_s = 600000.0;  // of a white diffuser, green
+  double dn_per_s = 600000.0;  // rate of a white diffuser, green
   double ambient_dn_per_s = 0.0;
   std::function<double(double)> bend = [](double dn) { return dn; };
-  // What the light does at a site of a patch, and how bright it is in a frame.
+  // How the light falls at a site of a patch, and how bright it is in a frame.
   std::function<double(size_t patch, int x, int y)> shading = [](size_t patch, int x, int) {
     return 1.0 - 0.1 * static_cast<double>(patch) + 0.0002 * x;
   };

@@ -32,8 +32,9 @@ inline const std::vector<Eigen::Vector3d>& Centers() {
   return centers;
 }
 
-// What a ray sees of one sphere: nothing beside it, otherwise the lamps' mirror images, each a
-// bell of one degree about where it lies as seen from the place of reflection.
+// Returns the light that a ray sees on one sphere. A ray beside the sphere gives nothing. Otherwise
+// it sees the lamps' mirror images, each a bell of one degree about where it lies as seen from the
+// place of reflection.
 inline std::optional<double> Mirrored(const Eigen::Vector3d& origin, const Eigen::Vector3d& ray,
                                       const Eigen::Vector3d& center,
                                       const std::vector<Eigen::Vector3d>& lamps) {

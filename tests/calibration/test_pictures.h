@@ -29,9 +29,10 @@ inline Image<uint8_t> GreyFile(const std::filesystem::path& path) {
 }
 
 // Renders a plane whose print is `white_at` (in its millimetres), 0 to 1, through the lens: 34 rays
-// per pixel, in a Fibonacci lattice, whose shadow on each side has 34 places too, so that edges along
-// the rows come out as smooth as others; and noise of `noise_dn` grey levels. Where the rays meet
-// the plane is interpolated between the pixel's corners, which no lens bends enough to be seen.
+// per pixel, in a Fibonacci lattice, whose shadow on each side has 34 places too, so that edges
+// along the rows come out as smooth as others; and noise of `noise_dn` grey levels. Where the rays
+// meet the plane is interpolated between the pixel's corners, which no lens bends enough to be
+// seen.
 inline Image<uint8_t> PictureOf(const Camera& lens, const Eigen::Isometry3d& camera_from_plane,
                                 const std::function<double(double, double)>& white_at,
                                 uint64_t seed, double noise_dn = 2.0) {

@@ -58,7 +58,7 @@ TEST(BalanceLights, TheScatterOfPatchesCountsWhereItIsLarger) {
   const double high = -std::log(0.99);
   EXPECT_NEAR(balance.white_balance[0], std::exp(0.5 * (low + high)), 1e-12);
   EXPECT_NEAR(balance.sd[0], 0.5 * (high - low), 1e-5);  // the error of a mean of two
-  EXPECT_NEAR(balance.sd[2], 0.001, 1e-5);               // of noise: sqrt 2 / sqrt 2
+  EXPECT_NEAR(balance.sd[2], 0.001, 1e-5);               // noise: sqrt 2 / sqrt 2
   EXPECT_EQ(balance.patches, 2U);
 }
 

@@ -51,7 +51,7 @@ TEST(BenchAccuracy, ComparesColoursWithMosaicsAndWritesThePage) {
   const nlohmann::json& colours = RowOf(report, "ladder", "twill-small");
   const nlohmann::json& mosaics = RowOf(report, "ladder, mosaics", "twill-small");
   EXPECT_LT(mosaics.at("mean_deg").get<double>(), colours.at("mean_deg").get<double>());
-  // What a Lambertian surface is predicted to err by is what it errs by.
+  // The predicted error of a Lambertian surface is its actual error.
   const nlohmann::json& relief = RowOf(report, "ladder", "Lambertian relief");
   EXPECT_NEAR(relief.at("standardised_error").get<double>(), 1.0, 0.1);
   EXPECT_NEAR(relief.at("coverage").get<double>(), 0.975, 0.02);

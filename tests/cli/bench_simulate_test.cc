@@ -42,7 +42,7 @@ TEST(BenchSimulate, MeasuresEveryStepAndEverySwitch) {
     error_deg[one.at("switch")] = one.at("mean_angular_error_deg");
   }
   const double plain_deg = error_deg.at("plain: near lights, Lambert");
-  EXPECT_LT(plain_deg, 0.5);  // what is left is the relief, which the solver takes for flat
+  EXPECT_LT(plain_deg, 0.5);  // the rest is the relief, which the solver takes for flat
   // Each of these is there: it moves the answer.
   for (const char* name :
        {"bounce_rays 64", "ambient_rgb 0.1", "flicker 0.2", "specular ggx 0.3", "psf_sigma_px 3",

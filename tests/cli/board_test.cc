@@ -24,7 +24,8 @@ RunResult Board(std::vector<std::string> words) {
                                                           cli::RunBoardPrint);
 }
 
-// What is printed is what is looked for, corner by corner, and a millimetre is a millimetre.
+// The printed board is the one that is looked for, corner by corner, and a millimetre is a
+// millimetre.
 TEST(BoardPrint, TheBoardIsFoundInItsPictureInItsSize) {
   const TempFolder folder;
   for (const char* text : {"charuco:10x7:25mm:18mm", "chessboard:9x6:24mm",

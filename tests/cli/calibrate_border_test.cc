@@ -148,7 +148,8 @@ TEST_F(CalibrateBorder, RecordedPosesComeFirst) {
   EXPECT_EQ(found.Json().at("sheets").size(), 1U);
 }
 
-// The rig that the sheets gave, checked on one of them: print is no fault where the border is named.
+// The rig that the sheets gave, checked on one of them: print is no fault where the border is
+// named.
 TEST_F(CalibrateBorder, ACheckLeavesThePrintOut) {
   ASSERT_EQ(Calibrate({"flat", "tilt-1", "tilt-3"}, {"--border", kBorder}).exit_status, 0);
   const auto check = [](const std::vector<std::string>& more) {

@@ -33,7 +33,7 @@ class CalibrateCheckCommand : public ::testing::Test {
     rig_["camera"]["size_px"] = {480, 360};
     rig_["camera"]["k"] = {1464.0, 1464.0, 239.5, 179.5};
     Render("clean", rig_, {});
-    // What calibrate lights would have found, in the units of the frames.
+    // The rig that `calibrate lights` would have found, in the units of the frames.
     fs::copy(Path("clean/rig.json"), Path("calibrated.json"));
   }
   static void TearDownTestSuite() {

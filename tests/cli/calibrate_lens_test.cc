@@ -38,8 +38,8 @@ std::string Text(const fs::path& path) { return ReadFileBytes(path).value(); }
 
 constexpr const char* kBoard = "charuco:10x7:25mm:18mm";
 
-// Sessions of a ChArUco board tilted each way, and of one lying on the table, under a lens that bends
-// lines, rendered once. The camera leans by some 8 degrees.
+// Sessions of a ChArUco board tilted each way, and of one lying on the table, under a lens that
+// bends lines, rendered once. The camera leans by some 8 degrees.
 class CalibrateLensCommand : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
@@ -225,7 +225,7 @@ TEST_F(CalibrateLensCommand, KeepsTheRestOfTheRigAndSaysWhatIsOutOfDate) {
   EXPECT_NE(after.camera->fx, rig.camera->fx);
   EXPECT_EQ(after.calibration.lights.value().date, "then");
   EXPECT_EQ(after.calibration.lens.value().inputs.value().size(),
-            16U);  // of each view its record and its frame
+            16U);  // record and frame of each view
   bool kept = false;
   for (const auto& entry : fs::directory_iterator(folder_->Path())) {
     kept = kept || (entry.path().filename().string().starts_with("whole-2") &&

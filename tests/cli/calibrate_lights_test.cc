@@ -32,8 +32,8 @@ RunResult CalibrateLights(std::vector<std::string> words) {
       std::move(words), cli::AddCalibrateLights, cli::RunCalibrateLights);
 }
 
-// Sheets of white paper as a 14-bit camera of 480 x 360 pixels sees them, and a rough rig whose lights
-// are 15 mm off, all rendered once.
+// Sheets of white paper as a 14-bit camera of 480 x 360 pixels sees them, and a rough rig whose
+// lights are 15 mm off, all rendered once.
 class CalibrateLightsCommand : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
@@ -213,7 +213,7 @@ TEST_F(CalibrateLightsCommand, AFrameThatIsThereTwiceIsFound) {
   EXPECT_FALSE(fs::exists(Path("twice.json")));
 }
 
-// What lens, pose and response wrote at -o stays: the session's own rig is older.
+// Parts that lens, pose and response wrote at -o stay: the session's own rig is older.
 TEST_F(CalibrateLightsCommand, TheRigAtTheOutputIsWhatItAddsTo) {
   fs::copy_file(Path("rough.json"), Path("grown.json"));
   Rig grown = ReadRig(Path("grown.json")).value();

@@ -56,7 +56,8 @@ TEST_F(CalibrateResponseCommand, MeetsItsBarsOnASimulatedChart) {
   EXPECT_LT(error.at("read_noise"), 0.05);
   EXPECT_LT(error.at("saturation"), 0.005);
   EXPECT_NEAR(json.at("black_dn"), 600.0, 0.1);
-  // 0.03 d^2 = 0.01 x, d = (x - 0.75) / 0.25, at x = 0.8841, which reads as 0.8753; 0.002 x at 0.8082.
+  // 0.03 d^2 = 0.01 x, d = (x - 0.75) / 0.25, at x = 0.8841, which reads as 0.8753; 0.002 x at
+  // 0.8082.
   const double departs_dn = 600.0 + 15292.0 * 0.8753;
   const double fine_dn = 600.0 + 15292.0 * 0.8066;
   for (const char* colour : {"red", "green", "blue"}) {
@@ -187,8 +188,8 @@ TEST_F(CalibrateResponseCommand, AlbedoIsNeutralInWhicheverOrderTheRigIsCalibrat
 }
 
 TEST_F(CalibrateResponseCommand, AChartThatLiesAskewAndTheOtherWayRoundIsFound) {
-  // The patches' places turned by 183 degrees about a point off the middle: the chart in the picture
-  // lies that way to this file.
+  // The patches' places turned by 183 degrees about a point off the middle: the chart in the
+  // picture lies that way to this file.
   nlohmann::json chart = ReadJson(ChartFile());
   const double turn = 183.0 * 3.14159265358979 / 180.0;
   for (nlohmann::json& patch : chart["patches"]) {

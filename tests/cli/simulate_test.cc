@@ -307,7 +307,8 @@ TEST(SimulateCommand, AChartMayHaveASeriesOfExposuresInPairs) {
   EXPECT_NEAR(MeanOf(out / "frames/led-3-0.005s-2.dng") / one, 1.0, 0.005);
   EXPECT_NE(ReadRawMosaic(out / "frames/led-3-0.005s-1.dng")->samples.pixels,
             ReadRawMosaic(out / "frames/led-3-0.005s-2.dng")->samples.pixels);
-  // What the chart is to tell is only in the truth; fluxes are as the sensor sees them.
+  // The response, which the chart is to tell, is only in the truth; fluxes are as the sensor sees
+  // them.
   EXPECT_FALSE(ReadRig(out / "rig.json")->response);
   const Rig truth = ReadRig(out / "truth/rig.json").value();
   EXPECT_EQ(truth.response->white, 15000.0);

@@ -12,7 +12,7 @@
 
 namespace sateen::testing {
 
-// Of a camera that sees green best, bends near the top and saturates below its files' white.
+// Sensor of a camera that sees green best, bends near the top and saturates below its files' white.
 inline constexpr const char* kSensor = R"("sensor": {"preset": "nikon-d5100", "black": 600,
     "saturation": 15100, "sensitivity_rgb": [0.52, 1, 0.71], "knee": 0.75, "compression": 0.03,
     "full_scale": 1.2})";

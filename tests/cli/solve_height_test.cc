@@ -95,11 +95,11 @@ TEST_F(SolveHeight, OfReliefIsFoundFromTheNormals) {
       worst =
           std::max(worst, std::abs(static_cast<double>(found.pixels[p] - truth.pixels[p]) + mean));
     }
-    EXPECT_LT(worst, 0.5);  // of 20 mm
+    EXPECT_LT(worst, 0.5);  // against 20 mm of height
     EXPECT_LT(report["relief"]["height_mm"][0].get<double>(), -8.0);
     EXPECT_GT(report["relief"]["height_mm"][1].get<double>(), 8.0);
   }
-  // Of an earlier run nothing is left.
+  // Nothing is left of an earlier run.
   EXPECT_EQ(SolveSession({}).exit_status, 0);
   EXPECT_FALSE(std::filesystem::exists(Path("maps/height.exr")));
 }

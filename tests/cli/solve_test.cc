@@ -305,7 +305,7 @@ TEST_F(SolveCommand, AFullDiskLeavesTheFormerMapsWhole) {
   EXPECT_EQ(std::distance(fs::directory_iterator(Path("maps")), {}), files);
 }
 
-// ---- Real photographs ----------------------------------------------------------------------------
+// ---- Real photographs ---------------------------------------------------------------------------
 
 class RealData : public ::testing::Test {
  protected:

@@ -5,7 +5,7 @@
 #include "tests/cli/cli_runner.h"
 #include "tests/testing/files.h"
 
-// What is made of a session and the maps of its solve.
+// Products of a session and the maps of its solve.
 namespace sateen::solved_session_test {
 namespace {
 
@@ -63,7 +63,7 @@ TEST_F(SolvedSession, IsShownWithItsMaps) {
   EXPECT_TRUE(fs::exists(Path("sheet.png")));
 }
 
-// Of the same size, so that nothing but the hashes tells.
+// The maps have the same size, so that nothing but the hashes tells.
 TEST_F(SolvedSession, IsNotShownWithTheMapsOfAnother) {
   const RunResult refused = Overview("hill", "maps");
   EXPECT_EQ(refused.exit_status, 3);

@@ -128,7 +128,7 @@ TEST(ProgressBar, RedrawsFarLessOftenThanItAdvances) {
     }
   }
   const std::string& text = terminal.Text();
-  // Ten draws a second: this many only if the loop above took over half an hour.
+  // Ten draws per second: this many only if the loop above took over half an hour.
   EXPECT_LT(std::count(text.begin(), text.end(), '\r'), kThreads * kSteps / 10);
 }
 

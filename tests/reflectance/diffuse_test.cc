@@ -115,7 +115,7 @@ TEST(Diffuse, Row1_30_HandFitAsPublished) {
   EXPECT_NEAR(AlbedoOf(at(0.0), 1.0), 0.9732, 5e-5);
   EXPECT_NEAR(AlbedoOf(at(0.5), 1.0), 0.9429, 5e-5);
   EXPECT_NEAR(AlbedoOf(at(1.0), 1.0), 0.9643, 5e-5);
-  // What the safe form is for: more light than arrives, from the rough fit at grazing angles.
+  // The reason for the safe form: more light than arrives, from the rough fit at grazing angles.
   EXPECT_NEAR(AlbedoOf(at(0.0), 0.1), 1.045, 5e-4);
   EXPECT_NEAR(AlbedoOf(at(0.0), 0.02), 1.127, 1e-3);  // quadrature: a peak at grazing angles
 }

@@ -8,7 +8,7 @@
 
 namespace sateen {
 
-// What the tests of reflectance models measure them with. The normal is z.
+// Tools with which the tests of reflectance models measure them. The normal is z.
 inline const Eigen::Vector3d kNormal = Eigen::Vector3d::UnitZ();
 inline const Eigen::Vector3d kWhite = Eigen::Vector3d::Ones();
 

@@ -128,7 +128,8 @@ TEST(CalibrationRecord, ARigWithoutOneHasNoSuchKey) {
   EXPECT_FALSE(RigOf(R"({"lens": {}})").calibration.lights);
 }
 
-// Each value in turn becomes one that no calibrator writes there, and each object gets one more key.
+// Each value in turn becomes one that no calibrator writes there, and each object gets one more
+// key.
 TEST(CalibrationRecord, KeepsWhatItDoesNotKnow) {
   const Json whole = Json::parse(kCalibration);
   const Json flat = whole.flatten();

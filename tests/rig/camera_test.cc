@@ -31,7 +31,7 @@ TEST(OverheadCamera, SeesItsWidthWithXRightAndYUp) {
   const Camera camera = OverheadCamera({400, 200}, /*distance_mm=*/500, /*width_mm=*/100);
   ASSERT_TRUE(camera.Validate("camera"));
 
-  // 0.25 mm a pixel; the corner pixel's centre lies half a pixel inside the 100 x 50 mm seen.
+  // 0.25 mm per pixel; the corner pixel's centre lies half a pixel inside the 100 x 50 mm seen.
   const Eigen::Vector3d top_left = TablePointOfPixel(camera, 0, 0).value();
   EXPECT_NEAR(top_left.x(), -49.875, 1e-12);  // rounding
   EXPECT_NEAR(top_left.y(), 24.875, 1e-12);
@@ -140,7 +140,7 @@ TEST(RayOfPixel, InvertsRandomLensesUpToTheirFold) {
     const double k3 = 0.2 * uniform(random);
     camera.distortion = {k1, k2, 3e-3 * uniform(random), 3e-3 * uniform(random), k3};
     const Eigen::Vector3d point(800 * uniform(random), 800 * uniform(random), 0.0);
-    double least_growth = 1.0;  // of the distorted radius, on the way to the point
+    double least_growth = 1.0;  // growth of the distorted radius, on the way to the point
     for (double s = 0.0; s < 1.0; s += 0.01) {
       const double r2 = s * point.squaredNorm() * 1e-6;
       least_growth = std::min(least_growth, 1 + r2 * (3 * k1 + r2 * (5 * k2 + r2 * 7 * k3)));

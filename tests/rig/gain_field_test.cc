@@ -47,8 +47,8 @@ TEST(GainField, WeightsAddUpToOne) {
   }
 }
 
-// A cubic spline holds polynomials to the third degree; its coefficients for x^2 and x^3 are those of
-// their blossoms: x^2 - h^2 / 3 and x^3 - x h^2 at the knots.
+// A cubic spline holds polynomials to the third degree; its coefficients for x^2 and x^3 are those
+// of their blossoms: x^2 - h^2 / 3 and x^3 - x h^2 at the knots.
 TEST(GainField, IsExactOnPolynomials) {
   constexpr double kH = 12.5;
   const GainField linear = FieldOf([](double x, double y) { return 2.0 + 0.3 * x - 0.2 * y; });

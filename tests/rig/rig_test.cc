@@ -48,7 +48,7 @@ Result<Rig> Read(const std::string& text) {
   return ReadRig(folder.Path() / "rig.json");
 }
 
-// What ReadRig says of FullRig() with a change at one place, without the path of the file.
+// Returns ReadRig's message about FullRig() with a change at one place, without the file's path.
 std::string MessageWith(const std::string& pointer, const Json& value) {
   Json rig = FullRig();
   rig[Json::json_pointer(pointer)] = value;
@@ -218,7 +218,7 @@ TEST(ReadRig, CameraIsNeededUnlessAllLightsAreDistant) {
   EXPECT_THAT(MessageWithout("/camera"), HasSubstr("camera is missing, but lights[1] is \"near\""));
 }
 
-// What `calibrate lens` writes without a rig to begin from, and `calibrate pose` then completes.
+// `calibrate lens` writes such a rig without one to begin from, and `calibrate pose` completes it.
 TEST(ReadRig, ACameraIsEnoughAndItsPoseMayCome) {
   Json json = FullRig();
   json["lights"] = Json::array();
@@ -261,7 +261,7 @@ TEST(ReadRig, OtherFilesAreRefused) {
   EXPECT_EQ(ReadRig("/nowhere/rig.json").error().code, ErrorCode::kIo);
 }
 
-// What a point of space sees, told from two table planes.
+// Light at a point of space, told from two table planes.
 TEST(Lifted, RigGivesEveryPointTheSameLightAndEveryPixelTheSameRay) {
   const Rig rig = Read(FullRig().dump()).value();
   constexpr double kHeightMm = 12.5;

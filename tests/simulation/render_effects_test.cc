@@ -128,8 +128,8 @@ TEST(Effects, SamplesAverageAlbedoOverThePixel) {
   EXPECT_NEAR(std::abs(Red(FrameOf(scene), 1, 0) - 0.5), 0.25, 1e-6);
 }
 
-// The corners of the squares of a print that lies tilted, turned and beside the middle are where its
-// frame says, as far from each other on the slope as on paper.
+// The corners of the squares of a print that lies tilted, turned and beside the middle are where
+// its frame says, as far from each other on the slope as on paper.
 TEST(Effects, APrintLiesInThePlaneUndistorted) {
   const double slope_rad = 0.6;
   PrintAlbedo chess = Chess(4, 4, 10.0, 0.0, 1.0);
@@ -184,8 +184,9 @@ TEST(Effects, EachYarnHasAnAlbedoOfItsOwnWithinTheVariation) {
   EXPECT_GT(highest, 0.68);
 }
 
-// A groove lit along x from low: the left wall lies in attached shadow, the right one is lit where the
-// left rim lets light pass. What the left wall sees is the lit part of the right wall, with its albedo.
+// A groove lit along x from low: the left wall lies in attached shadow, the right one is lit where
+// the left rim lets light pass. What the left wall sees is the lit part of the right wall, with its
+// albedo.
 TEST(Effects, ABounceComesFromWhatIsLitWithTheAlbedoThere) {
   const double depth = 10.0;  // walls at 45 degrees
   Scene scene = SceneOf(MakeGroove(depth, std::numbers::pi / 2),
@@ -196,7 +197,8 @@ TEST(Effects, ABounceComesFromWhatIsLitWithTheAlbedoThere) {
   const RenderedFrame frame = FrameOf(scene);
   const Result<SceneRenderer> renderer = SceneRenderer::Create(scene);
   ASSERT_TRUE(renderer);
-  // Lit is the right wall above z where the ray over the left rim (-depth, 0) meets it: x = z + depth.
+  // Lit is the right wall above z where the ray over the left rim (-depth, 0) meets it: x = z +
+  // depth.
   const double slope = std::tan(0.3);
   const double x_low = depth * (1.0 - slope) / (1.0 + slope);
   const double from = x_low * std::numbers::sqrt2;  // along the wall, from the corner
@@ -245,8 +247,8 @@ TEST(Effects, NearLightsThrowShadowsFromWhereTheyAre) {
       dark_until = static_cast<double>(at[0].At(x, y));
     }
   }
-  // From the lamp over the edge down to the tread: no shadow on the side of the lamp, so the stair must
-  // rise towards it.
+  // From the lamp over the edge down to the tread: no shadow on the side of the lamp, so the stair
+  // must rise towards it.
   const double height = lamp.position_mm.z() - top;
   const double length = rise * (lamp.position_mm.x() - edge) / height;
   EXPECT_NEAR(edge - dark_until, length, 0.4);

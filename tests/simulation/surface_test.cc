@@ -109,7 +109,8 @@ TEST(Surface, KnownHeights) {
 }
 
 TEST(Weave, FloatsAreAsLongAsThePatternSays) {
-  // Along the middle of a warp yarn of 4 crossings of a 2/2 twill, two are on top; of a satin 4 of 5.
+  // Along the middle of a warp yarn of 4 crossings of a 2/2 twill, two are on top; of a satin 4 of
+  // 5.
   const auto warps_on_top = [](WeavePattern pattern, int repeat) {
     const SurfacePtr surface = Made(MakeWeave({.pattern = pattern}));
     int on_top = 0;

@@ -119,8 +119,8 @@ TEST(SolveLadder, PixelsInWhichNoFourSamplesAgreeAreMarked) {
 }
 
 // Coloured pixels of which each has its own number of usable samples and noise of its own. In every
-// other block of 16 all samples but one have a white highlight, beside which that one counts as dark:
-// there fewer samples of luminance are in the band than of the departure from grey.
+// other block of 16 all samples but one have a white highlight, beside which that one counts as
+// dark: there fewer samples of luminance are in the band than of the departure from grey.
 RenderedRelief ColouredOfSixToEightSamples(const Rig& rig, ImageSize size, unsigned seed) {
   RenderedRelief rendered = Render(rig, size, 15.0);
   std::mt19937 random(seed);
@@ -191,8 +191,8 @@ TEST(Consensus, WhatFloatRefusesIsSolvedInDouble) {
 }
 
 TEST(Consensus, IsNotSureOfItselfWhereTheWrongSamplesAgree) {
-  // Six lights of ten see a flat surface, as light from the neighbourhood may show it: they agree with
-  // each other, and the consensus is wrong by up to 40 degrees without any spread.
+  // Six lights of ten see a flat surface, as light from the neighbourhood may show it: they agree
+  // with each other, and the consensus is wrong by up to 40 degrees without any spread.
   const Rig rig = TwoRings();
   RenderedRelief rendered = Render(rig, {60, 40}, 40.0);
   const RenderedRelief flat = Render(rig, {60, 40}, 40.0, ReliefShape::kFlat);
@@ -207,7 +207,8 @@ TEST(Consensus, IsNotSureOfItselfWhereTheWrongSamplesAgree) {
   }
   const NormalField field = MustSolve(rendered.stack, rig, Forced(LadderMode::kConsensus));
   EXPECT_GT(ErrorOf(field, rendered).mean, 15.0);
-  // (12): 0.4 of the angle to rung 1, or of the albedo's change, and more where samples are rejected.
+  // (12): 0.4 of the angle to rung 1, or of the albedo's change, and more where samples are
+  // rejected.
   const NormalField plain = MustSolve(rendered.stack, rig, Forced(LadderMode::kLeastSquares));
   size_t doubted = 0;
   size_t albedo_doubted = 0;
@@ -255,7 +256,7 @@ TEST(Consensus, APixelWithoutAnAnswerSaysSo) {
 }
 
 TEST(Consensus, RungOneIsDoubtedAsMuchAsPixelsClimb) {
-  // Of 100 rows so many are spoiled; in the others least squares are exact.
+  // Spoils so many of 100 rows; in the others least squares are exact.
   const Rig rig = TwoRings();
   const auto solve = [&](int spoiled_rows) {
     RenderedRelief rendered = Render(rig, {40, 100}, 15.0);

@@ -82,7 +82,8 @@ TEST(AngularErrorDeg, RefusesTruthOfAnotherSize) {
   EXPECT_THAT(error.error().message, HasSubstr("2x1 px but the solved ones 1x1 px"));
 }
 
-// A field of solved normals whose slopes are the true ones, which are those of a weave, plus `more`.
+// A field of solved normals whose slopes are the true ones, which are those of a weave, plus
+// `more`.
 template <typename More>
 double WorstLowFrequencyDeg(ImageSize size, double pitch_mm, const More& more,
                             NormalField* edited = nullptr) {

@@ -154,7 +154,7 @@ void ExpectAgreement(int first_seed, int count, LightModel highest) {
     ExpectSameResidual(*fast, *reference);
     compared += angle.count;
   }
-  EXPECT_GT(compared, 100 * count);  // that the cases are not all refused
+  EXPECT_GT(compared, 100 * count);  // not all cases are refused
 }
 
 TEST(FastKernel, AgreesWithTheReferenceOnRandomStacks) {

@@ -11,7 +11,8 @@
 namespace sateen::gain_rows_test {
 namespace {
 
-// Every pixel against the spline itself, at sizes and lenses where 16 px between knots do and do not.
+// Every pixel against the spline itself, at sizes and lenses where 16 px between knots do and do
+// not.
 TEST(GainRows, EveryPixelIsWithinTheBound) {
   for (const int width : {61, 640, 1900}) {
     const ImageSize size{width, width * 2 / 3};

@@ -48,8 +48,9 @@ void Unsolve(size_t pixel, NormalField& field) {
   field.reason.pixels[pixel] = static_cast<uint8_t>(Reason::kDark);
 }
 
-// Largest difference from the truth over the solved pixels. Heights whose mean is 0 are those of the same
-// picture from a camera that is nearer by the true mean: c_z - z = (c_z - z') (c_z - mean) / c_z.
+// Largest difference from the truth over the solved pixels. Heights whose mean is 0 are those of
+// the same picture from a camera that is nearer by the true mean:
+// c_z - z = (c_z - z') (c_z - mean) / c_z.
 double WorstHeightErrorMm(const Image<float>& height_mm, const DrapedScene& scene,
                           const NormalField& field, const Camera& camera) {
   double mean = 0.0;
@@ -129,7 +130,7 @@ TEST_P(EveryLight, HeightsReachEveryRungAndTheMosaics) {
   }
   for (const LadderMode mode : {LadderMode::kAuto, LadderMode::kConsensus}) {
     const NormalField field = readings.Solve(rig, {.mode = mode}, 0, std::nullopt, scene.height_mm);
-    EXPECT_LT(MaxErrorDeg(field, scene), mode == LadderMode::kAuto ? 4e-3 : 0.03);  // of triples
+    EXPECT_LT(MaxErrorDeg(field, scene), mode == LadderMode::kAuto ? 4e-3 : 0.03);  // triples
   }
   EXPECT_GT(MeanErrorDeg(readings.Solve(rig), scene), 0.2);
 }
@@ -144,7 +145,8 @@ TEST(Height, OfZeroChangesNoBit) {
 }
 
 TEST(IntegrateNormals, FindsADrapeThroughALeaningDistortedCamera) {
-  // Sides that the transform takes, and an odd one and one of a large prime, for which it is larger.
+  // Sides that the transform takes, and an odd one and one of a large prime, for which it is
+  // larger.
   for (const ImageSize size : {ImageSize{140, 108}, ImageSize{139, 106}}) {
     Rig rig = CloseRig(size);
     rig.camera->distortion = {-0.1, 0.02, 1e-3, -5e-4, 0.0};
@@ -153,7 +155,7 @@ TEST(IntegrateNormals, FindsADrapeThroughALeaningDistortedCamera) {
 
     const Image<float> height = IntegrateNormals(field, *rig.camera).value();
 
-    // (3) is the trapezium rule: at 1 mm a pixel off by (z''(b) - z''(a)) / 12 mm^2, 2e-3 mm.
+    // (3) is the trapezium rule: at 1 mm per pixel off by (z''(b) - z''(a)) / 12 mm^2, 2e-3 mm.
     EXPECT_LT(WorstHeightErrorMm(height, scene, field, *rig.camera), 3e-3);
     double mean = 0.0;
     for (const float z : height.pixels) {
@@ -180,7 +182,8 @@ TEST(IntegrateNormals, GoesAroundWhatIsNotSolvedAndSpansIt) {
   const Image<float> height = IntegrateNormals(field, *rig.camera).value();
 
   EXPECT_LT(WorstHeightErrorMm(height, scene, field, *rig.camera), 3e-3);
-  // A membrane over the hole of 24 mm: the cloth's bend over it, 12^2 / 4 of 8 (kX^2 + kY^2), is 0.7 mm.
+  // A membrane over the hole of 24 mm: the cloth's bend over it, 12^2 / 4 of 8 (kX^2 + kY^2), is
+  // 0.7 mm.
   const float middle = height.At(60, 50) - height.At(46, 50);
   EXPECT_NEAR(static_cast<double>(middle),
               static_cast<double>(scene.height_mm.At(60, 50) - scene.height_mm.At(46, 50)), 1.0);
@@ -225,7 +228,7 @@ TEST(IntegrateNormals, RefusesWhatItCannotTellFrom) {
   EXPECT_EQ(IntegrateNormals(field, *rig.camera).error().code, ErrorCode::kDegenerate);
 }
 
-// What `sateen solve --relief` does.
+// `sateen solve --relief` does this.
 TEST_P(EveryLight, ASecondSolveAtTheHeightsOfTheFirstIsFarBetter) {
   const Rig rig = CloseRig(kDrapeSize, GetParam());
   const DrapedScene scene =

@@ -73,7 +73,8 @@ TEST(SolveLadder, ReachesTheCramerRaoBoundAtFiveExposures) {
 
 TEST(SolveLadder, WeightsDoNotBias) {
   // Weights from the samples themselves would draw albedo and slope down by about one part in the
-  // electrons of a sample: 2 % at the 50 electrons here. The mean of 16,000 pixels is good to 0.2 %.
+  // electrons of a sample: 2 % at the 50 electrons here. The mean of 16,000 pixels is good to 0.2
+  // %.
   const SensorModel sensor{.full_scale = 1.0, .electrons = 150.0, .read_noise_electrons = 1.0};
   const Rig rig = TwoRings();
   const RenderedRelief rendered =

@@ -201,7 +201,7 @@ TEST_P(EveryBackend, FluxInAnyUnitMeetsRadianceInAnyUnit) {
     EXPECT_LT(AngularErrorDeg(field, relief.normal).value().max, 1e-3);
     const double expected =
         static_cast<double>(relief.albedo[1].pixels[7]) / flux * static_cast<double>(radiance);
-    if (expected > 1e-37 && expected < 1e37) {  // what a float can say
+    if (expected > 1e-37 && expected < 1e37) {  // range of a float
       EXPECT_NEAR(static_cast<double>(field.albedo[1].pixels[7]) / expected, 1.0, 1e-5);
     }
   }
@@ -242,7 +242,7 @@ TEST_P(EveryBackend, StopsWhenCancelled) {
   EXPECT_EQ(field.error().code, ErrorCode::kCancelled);
 }
 
-// ---- Errors --------------------------------------------------------------------------------------
+// ---- Errors -------------------------------------------------------------------------------------
 
 struct BadInput {
   RenderedRelief relief = Render(RingRig({8, 6}), {8, 6});

@@ -51,7 +51,8 @@ struct ActualOverPredicted {
   double albedo = 0.0;
 };
 
-// Root mean squares over 2,000 disturbed rigs, of some pixels: error over what LightDoubt says. 1 = honest.
+// Root mean squares over 2,000 disturbed rigs, of some pixels: error over what LightDoubt says. 1 =
+// honest.
 ActualOverPredicted CompareDisturbed(const Rig& rig, const RenderedRelief& truth) {
   const LightDoubt doubt = LightDoubt::Make(rig, kSmall).value();
   double angle = 0.0;
@@ -107,7 +108,7 @@ TEST(LightDoubt, IsTheActualErrorUnderPositionsThatAreOff) {
     light.position_sd_mm = {2.0, 2.0, 2.0};
     light.irradiance_sd = 0.001;
   }
-  // What a shift does to the irradiance away from the table's middle is not in (2).
+  // The effect of a shift on the irradiance away from the table's middle is not in (2).
   ExpectHonest(rig, 0.13);
 }
 

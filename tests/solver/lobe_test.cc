@@ -183,10 +183,10 @@ std::pair<double, double> StandardisedErrors(const NormalField& field,
   return {std::sqrt(of_angle / count), std::sqrt(of_albedo / count)};
 }
 
-// Noise that hides much of the lobe: pixels that have it and pixels that do not are told apart by odds, and
-// what is not sure is in the uncertainty.
+// Noise that hides much of the lobe: pixels that have it and pixels that do not are told apart by
+// odds, and what is not sure is in the uncertainty.
 TEST(Lobe, BesideMatteClothEveryPixelSaysHowSureItIs) {
-  constexpr int kShare = 90;  // of 100
+  constexpr int kShare = 90;  // percent
   constexpr double kFewElectrons = 100000.0;
   const Rig rig = RingRig(kLobeSize);
   RenderedRelief rendered = Render(rig, kLobeSize, 20.0);

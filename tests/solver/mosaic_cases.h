@@ -100,9 +100,9 @@ inline MosaicOptions Ladder(LadderMode mode, Backend backend = Backend::kAuto) {
 }
 
 struct ErrorsAndUncertainty {
-  double actual_over_predicted = 0.0;  // of the root mean squares
+  double actual_over_predicted = 0.0;  // ratio of the root mean squares
   double standardised = 0.0;           // root mean square of error over uncertainty
-  double standardised_albedo = 0.0;    // the same of the sites' own colours
+  double standardised_albedo = 0.0;    // the same for the sites' own colours
 };
 
 inline ErrorsAndUncertainty CompareErrors(const NormalField& field, const RenderedRelief& truth,

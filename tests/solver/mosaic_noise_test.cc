@@ -65,7 +65,7 @@ TEST(MosaicNoise, ADarkCaptureOfUnknownNoiseIsDark) {
   EXPECT_EQ(field.summary.dark, static_cast<int64_t>(kSize.PixelCount()));
 }
 
-// Readings of few whole numbers, whose neighbours mostly do not differ: 0.02 DN an electron.
+// Readings of few whole numbers, whose neighbours mostly do not differ: 0.02 DN per electron.
 TEST(MosaicNoise, NoiseBelowRoundingIsMeasured) {
   const Rig rig = RingRig({256, 192}, LightModel::kNear);
   Readings readings(Render(rig, {256, 192}), rig);

@@ -35,7 +35,7 @@ TEST(NoiseOf, TakesGainAndWhiteBalanceFromTheRig) {
   rig.response = response;
   LightStack stack(1);
   stack[0].raw = true;
-  stack[0].full_scale = 30.0F;  // of red, the largest: 2e-3 a DN, green half of that
+  stack[0].full_scale = 30.0F;  // the largest, red: 2e-3 per DN, green half of that
   const StackNoise noise = NoiseOf(stack, rig).value();
   EXPECT_DOUBLE_EQ(noise[0].shot[0], 0.25 * 2e-3);
   EXPECT_DOUBLE_EQ(noise[0].shot[1], 0.25 * 1e-3);

@@ -13,11 +13,11 @@ namespace {
 
 using namespace sateen::testing;  // NOLINT(google-build-using-namespace): the cases of this file
 
-// Float arithmetic rounds about ten operations a sample and the lights besides: measured, three
+// Float arithmetic rounds about ten operations per sample and the lights besides: measured, three
 // times the error of the reference on noiseless data.
 constexpr double kFloatFactor = 8.0;
-// What that comes to at the worst conditioning that kFast accepts; a tenth and a fifth of the bars
-// for noiseless scenes, a hundredth of what a 14-bit sensor leaves.
+// Error that this gives at the worst conditioning that kFast accepts: a tenth and a fifth of the
+// bars for noiseless scenes, a hundredth of the error that a 14-bit sensor leaves.
 constexpr double kFloatFloorMaxDeg = 1e-4;
 constexpr double kFloatFloorMeanDeg = 2e-5;
 
@@ -42,7 +42,7 @@ NormalField Solve(const Case& c, Backend backend, const LambertianOptions& optio
 // Every backend: solved pixels within the bound. kAuto: all that the reference solved, and never
 // more than twice its error (or the rounding of float results, where both are that good).
 void ExpectLaw(const Case& c, double bound_deg, const LambertianOptions& options = {}) {
-  // What float can hold, kFast must not refuse.
+  // kFast must not refuse a case that float can hold.
   const bool fast_must_solve = bound_deg <= RoundingBoundDeg(3.0);
   const NormalField reference = Solve(c, Backend::kJacobiSvd, options);
   const ErrorStatistics reference_error = AngularErrorDeg(reference, c.normal).value();

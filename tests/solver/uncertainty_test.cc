@@ -59,8 +59,8 @@ TEST(SolveLadder, UncertaintyIsTheActualErrorOverTwentyScenes) {
   }
 }
 
-// Root mean square of the actual angles over that of the uncertainties, where rung 1 gives them; 1 =
-// honest.
+// Root mean square of the actual angles over that of the uncertainties, where rung 1 gives them; 1
+// = honest.
 double ActualOverReported(const NormalField& field, const RenderedRelief& truth) {
   Image<float> error;
   EXPECT_TRUE(AngularErrorDeg(field, truth.normal, &error));

@@ -12,7 +12,7 @@ using ::testing::HasSubstr;
 
 BoardSpec Board(const char* text) { return ParseBoardSpec(text).value(); }
 
-// What a board's own description says of a place, square by square and cell by cell.
+// Tells black from white by the board's own description, square by square and cell by cell.
 bool IsBlackBySpec(const BoardSpec& spec, double x, double y) {
   const int column = static_cast<int>(std::floor(x / spec.square_mm + 0.5 * spec.columns));
   const int row = static_cast<int>(std::floor(0.5 * spec.rows - y / spec.square_mm));

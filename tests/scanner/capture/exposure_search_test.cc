@@ -28,7 +28,8 @@ struct Outcome {
   int tests = 0;
 };
 
-// A linear scene: `rate` of what saturates per second at its bright end, `dark` of that at its dark end.
+// A linear scene: `rate` of what saturates per second at its bright end, `dark` of that at its dark
+// end.
 Result<Outcome> Search(double rate, double dark, const ExposureGoal& goal = {}) {
   Result<ExposureSearch> search = ExposureSearch::Begin(CameraTimes(), goal);
   if (!search) {
@@ -102,7 +103,8 @@ TEST(ExposureSearch, SaysWhatCannotBeExposed) {
               IsError(ErrorCode::kInvalidArgument, "--exposure"));
 }
 
-// At the level found, the signal is ten times its noise; a longer exposure would do nothing above it.
+// At the level found, the signal is ten times its noise; a longer exposure would do nothing above
+// it.
 TEST(ExposureSearch, TheDarkestUsefulSignalIsTenTimesItsNoise) {
   Response response{.black = 600.0, .white = 15'520.0};
   EXPECT_EQ(DarkestUseful(response), 0.004);

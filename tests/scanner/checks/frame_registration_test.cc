@@ -104,9 +104,10 @@ TEST(RegisterFrames, FindsOneFrameThatMovedAndCameBack) {
   EXPECT_LT(WorstError(cloth.Register(cloth.rig), truth), 0.05);
 }
 
-// Standard deviations are those of many sessions: noise alone, at 5 % of the brightness. The repeat,
-// to which gloss adds nothing, shows that (2) alone knows 0.6 of them; with what gloss adds, the other
-// frames' are 1.1 of them. 40 seeds of two axes know the ratio of one frame to 8 %, that of nine to 3 %.
+// Standard deviations are those of many sessions: noise alone, at 5 % of the brightness. The
+// repeat, to which gloss adds nothing, shows that (2) alone knows 0.6 of them; with what gloss
+// adds, the other frames' are 1.1 of them. 40 seeds of two axes know the ratio of one frame to 8 %,
+// that of nine to 3 %.
 TEST(RegisterFrames, KnowsHowSureItIs) {
   const std::vector<Eigen::Vector2d> truth = NudgedFrom(5, {0.4, 0.0});
   double actual2 = 0.0;
@@ -174,8 +175,9 @@ TEST(ShiftBetween, TellsNothingWithoutTexture) {
   EXPECT_EQ(ShiftBetween(flat, Image<float>(80, 58)).peak, 0.0);
 }
 
-// A weave of 16 px a yarn with a fine print, nudged by 0.4 px between frames 5 and 6: what the solve
-// makes of it. Rendered at twice the size, because a pixel's one ray would not move with the picture.
+// A weave of 16 px a yarn with a fine print, nudged by 0.4 px between frames 5 and 6: what the
+// solve makes of it. Rendered at twice the size, because a pixel's one ray would not move with the
+// picture.
 TEST(LayOverFirst, MendsTheNormalsOfANudgedSession) {
   const Rig rig = RingRig(testing::kLookPx, LightModel::kLed, 40.0);
   Scene scene{.rig = RingRig({2 * testing::kLookPx.width, 2 * testing::kLookPx.height},

@@ -50,8 +50,8 @@ TEST(TakeOutGloss, LeavesOneNudgeAlone) {
   }
 }
 
-// Under lights that do not wander, jumps of one length each: it is added to every standard deviation
-// but that of the last frame.
+// Under lights that do not wander, jumps of one length each: it is added to every standard
+// deviation but that of the last frame.
 TEST(TakeOutGloss, AddsTheMedianOfTheJumpsThatAreLeft) {
   std::vector<Shift> shifts = Still(0.03);
   for (size_t k = 1; k < kFrames; k += 2) {

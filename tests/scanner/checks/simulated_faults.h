@@ -100,7 +100,7 @@ inline std::string WordsOf(const CaptureCheck& check) {
   return words.empty() ? " nothing" : words;
 }
 
-// What the clean sessions show.
+// Results of the clean sessions.
 struct Clean {
   int sessions = 0;
   int false_alarms = 0;

@@ -161,7 +161,8 @@ inline FrameLook LookOf(const Image<float>& mosaic, const std::array<uint8_t, 4>
   return look;
 }
 
-// What a frame of the radiance looks like to the checks: noise of a sensor at a quarter of its range.
+// Returns a frame of the radiance as the checks see it, with noise of a sensor at a quarter of its
+// range.
 inline FrameLook LookAt(const Image3& radiance, uint64_t seed) {
   Sensor sensor = *SensorNamed("nikon-d5100");
   sensor.full_scale = 1.5;

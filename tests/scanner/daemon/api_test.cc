@@ -346,7 +346,7 @@ TEST(ApiJson, ACaptureSurvivesThereAndBack) {
       CaptureFromJson(R"({"kind":"capture","output":"/s","resume":true})", request.options);
   ASSERT_TRUE(resumed) << resumed.error().message;
   EXPECT_TRUE(resumed->request.resume);
-  EXPECT_EQ(resumed->request.options.tries, 5);  // what is not said is the daemon's default
+  EXPECT_EQ(resumed->request.options.tries, 5);  // the daemon's default, where the request has none
 }
 
 TEST(ApiJson, EventsAndSummariesSurviveThereAndBack) {

@@ -48,7 +48,7 @@ class RawClient {
     }
     return true;
   }
-  // What comes until `until` is in it, or the other end closes; gives up after a minute.
+  // Reads until `until` has come or the other end closes; gives up after a minute.
   std::string Read(const std::string& until = std::string()) {
     while (until.empty() || text_.find(until) == std::string::npos) {
       pollfd entry = {.fd = fd_, .events = POLLIN};

@@ -14,8 +14,9 @@
 #include "firmware/protocol/frame.h"
 #include "scanner/devices/byte_port.h"
 
-// An LED board in a few lines and in simulated time: what docs/protocol.md says, and every fault that
-// a cable has. The firmware itself is tested where the virtual rig is; this is for the host's side.
+// An LED board in a few lines and in simulated time: what docs/protocol.md says, and every fault
+// that a cable has. The firmware itself is tested where the virtual rig is; this is for the host's
+// side.
 namespace sateen::testing {
 
 struct Noise {

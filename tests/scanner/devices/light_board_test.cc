@@ -124,7 +124,7 @@ TEST(LightBoard, NoAnswerAfterAllTriesLosesTheConnection) {
   fake.mute = 0;
   ASSERT_TRUE(board.Connect());
   EXPECT_EQ(board.state(), State::kReady);
-  EXPECT_THAT(fake.lit, IsEmpty());  // what was lit by the command that failed is off
+  EXPECT_THAT(fake.lit, IsEmpty());  // lights of the command that failed are off
 }
 
 TEST(LightBoard, AnAnswerThatComesLateIsNotTakenForTheNext) {

@@ -89,7 +89,7 @@ inline Rig FourLights() {
   return rig;
 }
 
-// What the record of WriteSession() says: frames of east to south, then one dark frame.
+// Returns the record of WriteSession(): frames of east to south, then one dark frame.
 inline Session FourLightSession() {
   Session session;
   session.rig = "../rig.json";

@@ -128,7 +128,7 @@ TEST_F(StackReader, WarnsOnceOfFramesThatWereSrgb) {
   const Dataset srgb = MustRead();
   ASSERT_THAT(srgb.warnings, SizeIs(1));
   EXPECT_THAT(srgb.warnings[0], HasSubstr("4 of 4 frames are sRGB files and were linearised"));
-  EXPECT_NEAR(srgb.stack[0].rgb[0].At(0, 0), 0.21586F, 1e-5F);  // of 128 / 255, IEC 61966-2-1
+  EXPECT_NEAR(srgb.stack[0].rgb[0].At(0, 0), 0.21586F, 1e-5F);  // from 128 / 255, IEC 61966-2-1
 
   const Dataset linear = MustRead({.encoding = Encoding::kLinear});
   EXPECT_THAT(linear.warnings, IsEmpty());

@@ -27,7 +27,7 @@ double Texture(double x, double y) {
   return 0.5 + 0.2 * std::sin(0.9 * x) + 0.2 * std::cos(0.7 * y);
 }
 
-// What is at x in the first frame is at x + shift in this one. Lanczos' window of six leaves 1 %.
+// A detail at x in the first frame is at x + shift in this one. Lanczos' window of six leaves 1 %.
 TEST(LayOverFirst, BringsBackWhatHasMoved) {
   for (const Eigen::Vector2d& shift :
        {Eigen::Vector2d(0.4, 0.0), Eigen::Vector2d(-0.3, 0.7), Eigen::Vector2d(1.6, -2.5)}) {

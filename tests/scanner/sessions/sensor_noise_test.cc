@@ -23,8 +23,8 @@ constexpr double kRead = 4.0;
 class SensorNoiseTest : public ::testing::Test {
  protected:
   struct Exposure {
-    double brightness = 0.0;  // of the cloth; 0: dark
-    double right_px = 0.0;    // by which a part has moved: from this share of the width on
+    double brightness = 0.0;  // brightness of the cloth; 0: dark
+    double right_px = 0.0;    // shift of a part: from this share of the width on
     double moved_from = 0.9;
     bool is_noisy = true;
   };

@@ -101,7 +101,7 @@ TEST_F(SensorReadingTest, AResponseOfAnotherCameraIsRefused) {
   Write({1500.0, 2500.0, 3500.0}, other);
   const Error error = testing::FailureOf(temp_.Path());
   EXPECT_THAT(error.message, HasSubstr("the response is of another camera or mode"));
-  other.white = 60000.0;  // of a mode with more bits: the file's own white holds
+  other.white = 60000.0;  // a mode with more bits: the file's own white holds
   Write({1500.0, 2500.0, 4500.0}, other);
   EXPECT_GE(Read().rgb[2].At(21, 21), Read().full_scale);
 }

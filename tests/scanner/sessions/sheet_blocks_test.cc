@@ -24,8 +24,8 @@ BlockMeans Blocks() {
   return means;
 }
 
-// Blocks of 40 mm under a sheet with a blank inside of 244 x 168 mm, moved by 16 mm to the right: from
-// -106 to 138 and from -84 to 84 mm, whole blocks from -100 to 100 and from -80 to 80.
+// Blocks of 40 mm under a sheet with a blank inside of 244 x 168 mm, moved by 16 mm to the right:
+// from -106 to 138 and from -84 to 84 mm, whole blocks from -100 to 100 and from -80 to 80.
 TEST(SheetBlocks, OnlyTheBlankInsideCounts) {
   const SheetBorder border = ParseSheetBorder("sheet:282x206mm:12mm").value();
   ASSERT_NEAR(border.BlankMm().sizes().x(), 244.0, 1e-9);

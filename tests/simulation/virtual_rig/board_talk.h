@@ -168,7 +168,7 @@ class Talk {
 class BoardTest : public ::testing::Test {
  protected:
   struct Allowed {
-    milliseconds on{10'000};  // what a new board allows
+    milliseconds on{10'000};  // limit of a new board
     double level = 1;
   };
 

@@ -142,7 +142,7 @@ TEST_F(CaptureCommand, ARigThatTheBoardCannotSwitchIsRefusedBeforeAnythingIsWrit
   EXPECT_FALSE(fs::exists(dir_));
 }
 
-// What `calibrate lens` leaves behind has no lights.
+// The rig that `calibrate lens` leaves behind has no lights.
 TEST_F(CaptureCommand, ARigWithoutLightsIsRefused) {
   rig_.lights.clear();
   sateen::testing::WriteText(rig_file_, RigToJson(rig_));
@@ -205,7 +205,7 @@ TEST_F(CaptureCommand, PreviewWritesNothingButJpegs) {
   EXPECT_EQ(RunPreviewWith(args, *devices_, {}, out_, log_), 0) << log_.str();
 }
 
-// What saturates is magenta.
+// Saturated pixels are magenta.
 TEST_F(CaptureCommand, PreviewMarksWhatSaturates) {
   PreviewArgs args{.output = temp_.Path() / "look.jpg", .light = "0", .exposure = "1s"};
   ASSERT_EQ(RunPreviewWith(args, *devices_, {}, out_, log_), 0) << log_.str();

@@ -19,8 +19,8 @@
 #include "tests/simulation/virtual_rig/board_talk.h"
 #include "tests/testing/files.h"
 
-// A capture without hardware in simulated time: the board's real firmware, and a camera that sees what
-// its pins light.
+// A capture without hardware in simulated time: the board's real firmware, and a camera that sees
+// what its pins light.
 namespace sateen::testing {
 
 inline constexpr ImageSize kCapturePx = {96, 64};
@@ -32,7 +32,7 @@ inline Rig CaptureRig() {
   return rig;
 }
 
-// What the camera sees of each channel alone: the table, painted with a pattern.
+// Returns the camera's picture of each channel alone: the table, painted with a pattern.
 inline std::vector<Image3> LightImages(const Rig& rig) {
   std::vector<Image3> images;
   for (const Light& light : rig.lights) {
@@ -52,20 +52,20 @@ inline std::vector<Image3> LightImages(const Rig& rig) {
   return images;
 }
 
-// The picture is what the lights give on average over the exposure. Frames of the same light are the
-// same bits.
+// The picture is what the lights give on average over the exposure. Frames of the same light are
+// the same bits.
 class LitCamera : public TetheredCamera {
  public:
   LitCamera(VirtualBoard& board, std::vector<Image3> images)
       : board_(board), images_(std::move(images)) {}
 
-  std::vector<Result<void>> fail_next;          // what the next captures fail with, last first
-  std::function<void(int capture)> on_exposed;  // in the middle of an exposure; captures from 0
+  std::vector<Result<void>> fail_next;          // failures of the next captures, last first
+  std::function<void(int capture)> on_exposed;  // middle of an exposure; captures from 0
   std::vector<size_t> image_of_channel;         // another wiring; empty: as the rig has it
-  std::vector<double> times_s;                  // that it says it has
-  // Whether the picture gets brighter with the exposure time; 20 ms is what the images are for.
+  std::vector<double> times_s;                  // times that it says it has
+  // Whether the picture gets brighter with the exposure time; the images are for 20 ms.
   bool exposure_counts = false;
-  bool needs_a_person = false;  // what it says after a failure
+  bool needs_a_person = false;  // its answer after a failure
   int captures = 0;
   int opened = 0;
 

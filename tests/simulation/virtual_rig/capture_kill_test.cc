@@ -76,7 +76,7 @@ ssize_t write(int fd, const void* bytes, size_t count) {
   return written;
 }
 
-int fsync(int) {  // what a test writes may be lost with the power
+int fsync(int) {  // writes of a test may be lost with the power
   return KillAround([] { return 0; });
 }
 
@@ -94,7 +94,7 @@ namespace fs = std::filesystem;
 constexpr int kWhole = 0;
 constexpr int kKilled = 77;
 constexpr int kOtherwise = 1;
-constexpr int kStride = 5;  // of the points that are tried; every kind of call comes up
+constexpr int kStride = 5;  // step between the points that are tried; every kind of call comes up
 constexpr int kFullDisks = 20;
 
 class CaptureKill : public BoardTest {
@@ -129,7 +129,7 @@ class CaptureKill : public BoardTest {
     if (!session) {
       return tl::unexpected(session.error());
     }
-    constexpr std::size_t kFrames = 13;  // of a capture that has no plan yet
+    constexpr std::size_t kFrames = 13;  // frames of a capture that has no plan yet
     const std::size_t open = session->Record().plan.empty() ? kFrames : session->Open().size();
     Result<CaptureSummary> summary = session->Run(host, camera, {.threads = 1});
     if (summary && static_cast<std::size_t>(camera.captures) > open + 1) {

@@ -7,8 +7,9 @@
 #include "tests/testing/files.h"
 #include "tests/testing/places.h"
 
-// Whole captures by the programs as people type them, on the virtual rig: real firmware, libserialport,
-// libgphoto2 and LibRaw. `capture_bench` does the same for every fault in every phase.
+// Whole captures by the programs as people type them, on the virtual rig: real firmware,
+// libserialport, libgphoto2 and LibRaw. `capture_bench` does the same for every fault in every
+// phase.
 namespace sateen::testing::capture_program_test {
 namespace {
 
@@ -70,7 +71,7 @@ class CaptureProgram : public ::testing::Test {
     }
   }
 
-  // Of the normals of plain least squares. [deg]
+  // Returns the median error of the normals of plain least squares. [deg]
   double MedianErrorOf(const fs::path& session) {
     const ShellResult solved =
         Shell(kSateen + " solve " + session.string() + " --robust none --json --truth " +
@@ -94,8 +95,8 @@ TEST_F(CaptureProgram, FindsTheExposureAndTakesEveryFrame) {
   EXPECT_EQ(report["rejected"], 0);
   ExpectAllLightsOff();
   ExpectWhole();
-  // Against the same as the simulator makes a RAW session of it. What is left in the median is noise,
-  // of which the exposure that was found may have a little less.
+  // Against the same as the simulator makes a RAW session of it. What is left in the median is
+  // noise, of which the exposure that was found may have a little less.
   const ShellResult simulated =
       Shell(kSateen + " simulate " + (scene_->Path() / "scene.json").string() + " -o " +
             (folder_.Path() / "raw").string());
@@ -137,8 +138,8 @@ TEST_F(CaptureProgram, AFaultOfTheCameraCostsAFrameAtMost) {
   ExpectWhole();
 }
 
-// Ctrl-C, once, in the middle of an exposure that a daemon takes; then a dry run beside the daemon, which is
-// idle.
+// Ctrl-C, once, in the middle of an exposure that a daemon takes; then a dry run beside the daemon,
+// which is idle.
 TEST_F(CaptureProgram, PreviewByADaemonHearsCtrlC) {
   const std::string look = (folder_.Path() / "look.jpg").string();
   WriteText(folder_.Path() / "daemon.sh",

@@ -72,7 +72,7 @@ TEST_F(CaptureTest, TakesEveryFrameOfThePlanByItsOwnLight) {
   }
   EXPECT_EQ(*VerifySession(dir_, {}), 14);  // 13 frames and the rig
   EXPECT_FALSE(fs::exists(dir_ / kIncoming));
-  // What solves read: each frame is what its light gives, to the noise of a site.
+  // Frames that solves read: each is the picture of its light, to the noise of a site.
   const Dataset dataset = MustRead(dir_);
   ASSERT_THAT(dataset.stack, SizeIs(10));
   const std::vector<Image3> images = LightImages(rig_);
@@ -106,7 +106,8 @@ TEST_F(CaptureTest, KeepsSettingsAndLevelInTheRecord) {
   EXPECT_NEAR(board_->Records()[3].highest_level, 0.5, 1e-9);
 }
 
-// The brightest light's 99.9th percentile comes to lie just below its goal, on a camera of third stops.
+// The brightest light's 99.9th percentile comes to lie just below its goal, on a camera of third
+// stops.
 TEST_F(CaptureTest, FindsTheExposure) {
   camera_.exposure_counts = true;
   for (double time_s = 0.0005; time_s < 2.0; time_s *= std::cbrt(2.0)) {
@@ -165,8 +166,8 @@ TEST_F(CaptureTest, ALightThatIsBrighterThanTheRigSaysShortensTheExposure) {
   EXPECT_TRUE(VerifySession(dir_, {}));
 }
 
-// A scene of three exposures a light, killed in the middle and gone on with; a frame of an earlier plan
-// does not stay.
+// A scene of three exposures a light, killed in the middle and gone on with; a frame of an earlier
+// plan does not stay.
 TEST_F(CaptureTest, BracketsAScene) {
   std::vector<Image3> images = LightImages(rig_);
   for (Image3& image : images) {

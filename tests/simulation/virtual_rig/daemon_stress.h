@@ -22,12 +22,12 @@
 #include "tests/scanner/daemon/http_talk.h"
 #include "tests/simulation/virtual_rig/capture_fakes.h"
 
-// The daemon with the real firmware in simulated time, under clients right and wrong; the board's pins
-// are the witness.
+// The daemon with the real firmware in simulated time, under clients right and wrong; the board's
+// pins are the witness.
 namespace sateen::testing {
 
-// A light that is on while no job runs, or with another one: seen at every change of a pin, not only
-// after calls.
+// A light that is on while no job runs, or with another one: seen at every change of a pin, not
+// only after calls.
 class PinWitness {
  public:
   PinWitness(VirtualBoard& board, const RigService& service) : service_(service) {
@@ -91,9 +91,9 @@ struct StressedDaemon {
 };
 
 struct StressCounts {
-  std::map<std::string, std::map<int, int>> statuses;  // of each kind of call
-  std::vector<double> milliseconds;                    // of each call
-  std::vector<std::string> wrong;                      // what must not be
+  std::map<std::string, std::map<int, int>> statuses;  // statuses per kind of call
+  std::vector<double> milliseconds;                    // time per call
+  std::vector<std::string> wrong;                      // violations; must be empty
 };
 
 // One client: calls of random kinds, each checked.
@@ -268,7 +268,8 @@ class StressClient {
                        daemon_.rig_file.string(), daemon_.folder.Path().string(), random_());
   }
 
-  // Where the state says before and after that no job runs, and none ran between, the pins are dark.
+  // Where the state says before and after that no job runs, and none ran between, the pins are
+  // dark.
   void CheckRig() {
     const auto idle_after = [&]() -> std::optional<std::uint64_t> {
       const nlohmann::json state = nlohmann::json::parse(BodyOf(Ask("GET", "/v1/state")), nullptr,

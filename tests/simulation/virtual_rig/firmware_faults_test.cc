@@ -5,8 +5,8 @@
 #include "firmware/controller/pins.h"
 #include "tests/simulation/virtual_rig/board_talk.h"
 
-// What happens to the board: resets, hangs, a damaged EEPROM, noise on its line. After each of them
-// all lights are off, the board says what it was, and goes on working.
+// Faults of the board: resets, hangs, a damaged EEPROM, noise on its line. After each of them all
+// lights are off, the board says what it was, and goes on working.
 namespace sateen::testing::firmware_faults_test {
 namespace {
 

@@ -3,7 +3,8 @@
 #include "firmware/controller/pins.h"
 #include "tests/simulation/virtual_rig/board_talk.h"
 
-// What the firmware lets no host do, whatever it sends. BoardTest watches all lights meanwhile.
+// Limits that the firmware lets no host exceed, whatever it sends. BoardTest watches all lights
+// meanwhile.
 namespace sateen::testing::firmware_limits_test {
 namespace {
 

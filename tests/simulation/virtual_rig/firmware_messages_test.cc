@@ -5,7 +5,7 @@
 #include "firmware/controller/pins.h"
 #include "tests/simulation/virtual_rig/board_talk.h"
 
-// What each message of the protocol does to the real firmware and to its outputs.
+// Effects of each message of the protocol on the real firmware and on its outputs.
 namespace sateen::testing::firmware_messages_test {
 namespace {
 
@@ -71,7 +71,7 @@ TEST_F(FirmwareMessages, WithoutHelloOnlyStatusAndAllOffAreDone) {
   EXPECT_EQ(board_->Records()[0].times_on, 0);
 }
 
-// What docs/rig.md tells people to solder.
+// The pins are those that docs/rig.md tells people to solder.
 TEST_F(FirmwareMessages, EachLightIsOnThePinOfTheManual) {
   const std::vector<ChipPin> lights = {
       {'D', 3}, {'D', 4}, {'D', 5}, {'D', 6}, {'D', 7}, {'B', 0}, {'B', 2},   // D3 ... D8, D10

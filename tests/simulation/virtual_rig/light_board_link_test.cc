@@ -25,7 +25,7 @@ class LightBoardLink : public BoardTest {
     ASSERT_TRUE(connected) << connected.error().message;
   }
 
-  // What the host believes is what shines.
+  // Expects that the lights which the host believes to be on are those that shine.
   void ExpectTruth() {
     const Result<BoardReport> report = host_->Report();
     ASSERT_TRUE(report) << report.error().message;

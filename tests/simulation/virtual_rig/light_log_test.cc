@@ -15,7 +15,7 @@ using std::chrono::nanoseconds;
 const LightLog::Time kStart = LightLog::Time(hours(1));
 LightLog::Time After(milliseconds time) { return kStart + time; }
 
-// Of light 0, between times after kStart; all is known.
+// Returns the mean of light 0 between times after kStart; all is known.
 double Mean(LightLog& log, milliseconds begin, milliseconds end) {
   log.KnownUntil(After(hours(2)));
   const auto means = log.MeanLevels(After(begin), After(end));

@@ -100,7 +100,7 @@ TEST(SensorOf, TakesTheResponseOfTheRigUnlessAnotherIsNamed) {
   EXPECT_THAT(SensorOf({.black_dn = 1e5}, rig).error().message, HasSubstr("black"));
 }
 
-// Of a scene on disk, lit as a board would have; H of the reference.
+// Camera of a scene on disk, lit as a board would light it; H of the reference.
 class SceneCameraTest : public ::testing::Test {
  protected:
   static constexpr LightLog::Time kOpen = LightLog::Time(hours(1));

@@ -14,8 +14,9 @@
 #include "tests/scanner/sessions/dataset_files.h"
 #include "tests/testing/files.h"
 
-// PtpCamera with libgphoto2 as it is, and a camera on the loopback interface. Deadlines are long where
-// the camera answers and short only where it never will; nothing depends on how fast the machine is.
+// PtpCamera with libgphoto2 as it is, and a camera on the loopback interface. Deadlines are long
+// where the camera answers and short only where it never will; nothing depends on how fast the
+// machine is.
 namespace sateen::testing::ptp_camera_test {
 namespace {
 
@@ -174,7 +175,7 @@ TEST_P(PtpCameraTest, AFullCardNeedsAPerson) {
   EXPECT_FALSE(camera->NeedsAPerson());
 }
 
-// What the disk refuses is not laid to the camera, which goes on.
+// The camera is not blamed for a refusal of the disk, and goes on.
 TEST_P(PtpCameraTest, ADiskThatTakesNoFileIsSaidWithItsPath) {
   const auto camera = Opened();
   const fs::path gone = home_.Path() / "gone";
@@ -279,7 +280,7 @@ TEST_F(PtpCameraFaults, TwoFilesForOneFrameAreRefused) {
 TEST_F(PtpCameraFaults, ASleepingCameraIsGivenUpAndFoundAgainAwake) {
   const auto camera = Opened();
   camera->Close();
-  options_.answer_timeout = milliseconds(1500);  // of a camera that never answers
+  options_.answer_timeout = milliseconds(1500);  // limit for a camera that never answers
   options_.settle = milliseconds(0);
   PtpCamera impatient(options_);
   ASSERT_TRUE(impatient.Open());

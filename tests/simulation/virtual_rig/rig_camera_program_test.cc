@@ -20,7 +20,7 @@ using ::testing::HasSubstr;
 
 const std::string kScene = testing::SourceDir() + "/samples/scenes/room-light.json";
 constexpr std::chrono::seconds kLong(60);
-constexpr double kWhite = 15892.0;  // of the D5100
+constexpr double kWhite = 15892.0;  // white of the D5100
 constexpr float kFullScale = 1.5F;  // the program's
 
 class RigCameraProgram : public ::testing::Test {

@@ -10,8 +10,8 @@
 #include "tests/simulation/virtual_rig/small_scene.h"
 #include "tests/testing/files.h"
 
-// What each command does to the rig, without its program: the loop is not run, and the board's time
-// stands still.
+// Effects of each command on the rig, without its program: the loop is not run, and the board's
+// time stands still.
 namespace sateen::testing::rig_commands_test {
 namespace {
 

@@ -98,7 +98,7 @@ class RunningRig {
     return {};
   }
 
-  // What the rig says on standard error once it says `words`; not for ever.
+  // Returns the rig's standard error once `words` is in it; does not wait for ever.
   std::string WaitForError(const std::string& words) {
     for (int i = 0; i < 3000; ++i) {
       std::ifstream file(log_);

@@ -26,11 +26,11 @@ FrameState Lit(std::initializer_list<std::pair<size_t, double>> lights) {
   return state;
 }
 
-// What a sensor without noise and of black 0 sees at a site, as part of white.
+// Returns the reading at a site of a sensor without noise and with black 0, as part of white.
 double At(const FrameState& state, int x, int y) {
   return FrameOfScene(SmallScene(), kPlain, state).At(x, y) / 65535.0;
 }
-constexpr double kReading = 0.6 / 65535.0;  // of rounding
+constexpr double kReading = 0.6 / 65535.0;  // tolerance for rounding
 
 // Colours of the sites of a Bayer sensor.
 size_t ColourAt(int x, int y) { return kPlain.cfa[static_cast<size_t>(y % 2 * 2 + x % 2)]; }
@@ -195,7 +195,7 @@ TEST(SceneFrame, AnEvenNudgeMovesSitesAsTheyAreAndRepeatsTheBorder) {
   const Image<uint16_t> after = FrameOfScene(SmallScene(), kPlain, state);
   EXPECT_EQ(after.At(20, 20), before.At(16, 22));
   EXPECT_EQ(after.At(63, 45), before.At(59, 47));
-  EXPECT_EQ(after.At(1, 47), before.At(1, 47));  // of its own colour
+  EXPECT_EQ(after.At(1, 47), before.At(1, 47));  // the border of its own colour
   EXPECT_EQ(after.At(2, 46), before.At(0, 46));
   state.shift_x_px = 1e5;
   EXPECT_EQ(FrameOfScene(SmallScene(), kPlain, state).At(30, 10), before.At(0, 12));
