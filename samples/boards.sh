@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
-# samples/boards.sh SATEEN DIR: sessions of a ChArUco board (10x7 squares of 15 mm, markers of 11 mm)
-# through the bent lens of samples/rigs/lens.json, to try the calibration of lens and pose on:
-# DIR/boards/view-1 to -16, tilted to all sides and up to the image's corners, and DIR/table.
+# Simulates sessions of a ChArUco board (10x7 squares of 15 mm, markers of 11 mm) through the distorting
+# lens of samples/rigs/lens.json, to try the calibration of lens and pose: DIR/boards/view-1 to -16,
+# tilted to all sides and up to the image's corners, and DIR/table.
+# Usage: samples/boards.sh SATEEN DIR
 set -euo pipefail
 sateen=$(realpath "$1")
 out=$2

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# The whole loop without hardware: white paper and a fabric are captured on the virtual rig (the LED
-# board's own firmware, real serial and camera libraries), the lights are calibrated by the paper, the
-# fabric is solved, and the maps are compared with the truth that only the simulator knows.
+# Runs the whole loop without hardware: captures white paper and a fabric on the virtual rig (the LED
+# board's own firmware, real serial and camera libraries), calibrates the lights with the paper, solves
+# the fabric, and compares the maps with the truth that only the simulator knows.
 # Usage: samples/capture.sh [FOLDER_OF_PROGRAMS [OUTPUT_FOLDER]]
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -12,12 +12,12 @@ mkdir -p "$out/capture"
 cp samples/rigs/ring10-rough.json "$out/capture/rig.json"
 cd "$out/capture"
 
-# What lies under the camera: how each light alone shows it, and the truth about it.
+# Renders what lies under the camera: one picture per light, and the truth.
 for scene in white-flat twill-table; do
   "$bin/sateen" simulate "$OLDPWD/samples/scenes/$scene.json" --linear -o "table/$scene" >/dev/null
 done
 
-# Says what it types. The virtual rig is the hardware: board, camera and what lies on the table.
+# Prints the command, then runs it. The virtual rig is the hardware: board, camera, object on the table.
 on_rig() {
   local scene=$1
   shift

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# samples/lights.sh: each light of the sample ring in turn, on the virtual rig: no hardware. Then what
-# shone and for how long, as the pins of the simulated board had it.
+# Turns on each light of the sample ring in turn, on the virtual rig: no hardware. Then prints which
+# lights were on and for how long, as the pins of the simulated board show it.
 # Usage: samples/lights.sh [FOLDER_OF_PROGRAMS]
 set -euo pipefail
 cd "$(dirname "$0")/.."
