@@ -35,7 +35,7 @@ tl::unexpected<Error> Fail(ErrorCode code, fmt::format_string<Args...> text, Arg
   return tl::unexpected<Error>({code, fmt::format(text, std::forward<Args>(args)...)});
 }
 
-// 2 usage, 3 bad or degenerate data, 4 I/O, 5 device, 6 cancelled. (0 is done, 1 internal.)
+// Returns 2 usage, 3 bad or degenerate data, 4 I/O, 5 device, 6 cancelled. (0 is done, 1 internal.)
 [[nodiscard]] int ExitStatus(const Error& error);
 
 }  // namespace sateen

@@ -13,7 +13,7 @@ namespace sateen {
 [[nodiscard]] Status ReadPieces(const std::filesystem::path& path,
                                 const std::function<void(std::string_view)>& use);
 
-// The file's bytes. kIo where it is absent, a folder or unreadable.
+// Reads the file's bytes. Fails with kIo if it is absent, a folder or unreadable.
 [[nodiscard]] Result<std::string> ReadFileBytes(const std::filesystem::path& path);
 
 // Creates or empties `path` and writes `bytes`. Errors speak of `shown`, the name that the user
@@ -25,7 +25,7 @@ namespace sateen {
 [[nodiscard]] Status FlushToDisk(const std::filesystem::path& path,
                                  const std::filesystem::path& shown);
 
-// The system's words for an errno.
+// Returns the system's words for an errno.
 [[nodiscard]] std::string SystemReason(int error_number);
 
 }  // namespace sateen

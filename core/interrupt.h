@@ -4,11 +4,12 @@
 
 namespace sateen {
 
-// From now on the first Ctrl-C (SIGINT) or SIGTERM sets InterruptFlag(), and a second one of the
-// same kind ends the program at once. A signal that the parent process had ignored stays ignored.
+// Makes the first Ctrl-C (SIGINT) or SIGTERM from now on set InterruptFlag(), and a second one of
+// the same kind end the program at once. A signal that the parent process had ignored stays
+// ignored.
 void InstallInterruptHandlers();
 
-// For Task::cancel.
+// Returns the flag for Task::cancel.
 [[nodiscard]] const std::atomic<bool>& InterruptFlag();
 
 }  // namespace sateen

@@ -26,10 +26,10 @@ class JsonReader {
   int Integer(std::string_view key);
   bool Boolean(std::string_view key);
   std::string String(std::string_view key);
-  // An array of exactly `count` numbers.
+  // Reads an array of exactly `count` numbers.
   std::vector<double> Numbers(std::string_view key, size_t count);
-  // An object or an array of objects, to be read by readers of their own; the path is extended.
-  // After a failure the object is one that has failed too, and the array is empty.
+  // Reads an object or an array of objects, to be read by readers of their own; the path is
+  // extended. After a failure the object is one that has failed too, and the array is empty.
   JsonReader Object(std::string_view key);
   std::vector<JsonReader> Objects(std::string_view key);
 
@@ -37,7 +37,7 @@ class JsonReader {
   std::optional<int> OptionalInteger(std::string_view key);
   std::optional<std::string> OptionalString(std::string_view key);
   std::optional<std::vector<double>> OptionalNumbers(std::string_view key, size_t count);
-  // An array of any length but 0.
+  // Reads an array of any length but 0.
   std::optional<std::vector<double>> OptionalNumberList(std::string_view key);
   std::optional<JsonReader> OptionalObject(std::string_view key);
   // Accepts `key` whatever it holds.
@@ -46,7 +46,7 @@ class JsonReader {
   // Fails unless `holds`; `found_needed` says what was found and what was needed ("is 7; need 8").
   void Require(bool holds, std::string_view key, std::string_view found_needed);
   [[nodiscard]] bool Has(std::string_view key) const;
-  // The first failure of this reader, or of a key that nobody asked for. Call it for every
+  // Returns the first failure of this reader, or of a key that nobody asked for. Call it for every
   // reader, also those from Object() and Objects().
   [[nodiscard]] Status Finish();
 

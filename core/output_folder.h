@@ -27,15 +27,16 @@ class OutputFolder {
   OutputFolder& operator=(const OutputFolder&) = delete;
   ~OutputFolder();
 
-  // Where to write the file that will be `name` ("normal.exr", "truth/normal.exr").
+  // Returns where to write the file that will be `name` ("normal.exr", "truth/normal.exr").
   [[nodiscard]] std::filesystem::path Stage(const std::string& name);
   // Stages `name` with `text` as its content.
   [[nodiscard]] Status WriteText(const std::string& name, const std::string& text);
-  // Commit() takes away the file `name` of an earlier run, unless it is staged.
+  // Makes Commit() take away the file `name` of an earlier run, unless it is staged.
   void Retire(const std::string& name);
-  // The error of whoever wrote to a staged place, speaking of the place that the user knows.
+  // Returns the error of whoever wrote to a staged place, speaking of the place that the user
+  // knows.
   [[nodiscard]] Error InPlace(Error error) const;
-  // kIo names the file that could not be flushed or put in place.
+  // Fails with kIo, which names the file that could not be flushed or put in place.
   [[nodiscard]] Status Commit();
 
   [[nodiscard]] const std::filesystem::path& Dir() const { return dir_; }

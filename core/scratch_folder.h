@@ -15,7 +15,7 @@ class ScratchFolder {
   ScratchFolder& operator=(const ScratchFolder&) = delete;
   ~ScratchFolder();
 
-  // kIo where it cannot be made.
+  // Fails with kIo if it cannot be made.
   [[nodiscard]] Status Create() const;
   [[nodiscard]] const std::filesystem::path& Path() const { return path_; }
 

@@ -8,7 +8,7 @@
 
 namespace sateen {
 
-// 64 lower-case hexadecimal digits.
+// Returns 64 lower-case hexadecimal digits.
 [[nodiscard]] std::string Sha256(std::string_view bytes);
 [[nodiscard]] Result<std::string> Sha256OfFile(const std::filesystem::path& path);
 

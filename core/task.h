@@ -31,10 +31,10 @@ struct Task {
   const std::atomic<bool>* cancel = nullptr;
 
   [[nodiscard]] bool Cancelled() const { return cancel != nullptr && cancel->load(); }
-  // kCancelled once `cancel` is set.
+  // Fails with kCancelled once `cancel` is set.
   [[nodiscard]] Status CheckCancelled() const;
   [[nodiscard]] int ThreadCount() const;
-  // The same on another number of threads.
+  // Returns the same on another number of threads.
   [[nodiscard]] Task WithThreads(int count) const {
     return {.threads = count, .progress = progress, .cancel = cancel};
   }

@@ -33,11 +33,11 @@ class BandWriter {
   BandWriter& operator=(const BandWriter&) = delete;
   ~BandWriter();
 
-  // The next rows: one image for each channel, all of one size and the file's width.
+  // Writes the next rows: one image for each channel, all of one size and the file's width.
   [[nodiscard]] Status Write(std::span<const Image<float>> planes);
   [[nodiscard]] Status Write(std::span<const Image<uint8_t>> planes);
   [[nodiscard]] Status Write(std::span<const Image<uint16_t>> planes);
-  // After the last row: the file is whole.
+  // Completes the file after the last row.
   [[nodiscard]] Status Close();
 
  private:

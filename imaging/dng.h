@@ -48,7 +48,7 @@ struct DngHeader {
 [[nodiscard]] Status WriteDng(const std::filesystem::path& path, const Image<uint16_t>& mosaic,
                               const DngHeader& header);
 
-// The same file as bytes. kInvalidArgument as above; kIo where libtiff has no memory.
+// Returns the same file as bytes. kInvalidArgument as above; kIo where libtiff has no memory.
 [[nodiscard]] Result<std::string> EncodeDng(const Image<uint16_t>& mosaic, const DngHeader& header);
 
 }  // namespace sateen

@@ -7,7 +7,7 @@
 
 namespace sateen {
 
-// "auto", "linear", "srgb".
+// Returns "auto", "linear" or "srgb".
 [[nodiscard]] std::string_view Name(Encoding encoding);
 [[nodiscard]] std::optional<Encoding> EncodingNamed(std::string_view name);
 

@@ -21,16 +21,16 @@ inline constexpr uint64_t kMaxCompression = 1 << 14;
 //          kBadData: it is empty
 [[nodiscard]] Result<FileHead> ReadFileHead(const std::filesystem::path& path);
 
-// True for the first bytes of a TIFF file; DNG, NEF, CR2, ARW and PEF are TIFF too.
+// Returns true for the first bytes of a TIFF file; DNG, NEF, CR2, ARW and PEF are TIFF too.
 [[nodiscard]] bool IsTiffHead(const std::string& bytes);
 
 // The next two find files that were cut short in ways their decoders let pass: libpng takes a
 // PNG without its end mark, and LibRaw gives zeros for tiles that a lossless DNG has lost.
 
-// kBadData unless the chunks of the PNG reach to its end mark.
+// Fails with kBadData unless the chunks of the PNG reach to its end mark.
 [[nodiscard]] Status CheckPngIsWhole(const std::filesystem::path& path);
-// kBadData unless every value, strip and tile of the TIFF's directories lies inside the file, and
-// the directories list as many tiles as their pictures have.
+// Fails with kBadData unless every value, strip and tile of the TIFF's directories lies inside the
+// file, and the directories list as many tiles as their pictures have.
 [[nodiscard]] Status CheckTiffIsWhole(const std::filesystem::path& path);
 
 }  // namespace sateen

@@ -35,14 +35,14 @@ struct Photo {
 [[nodiscard]] Result<Photo> ReadPhoto(const std::filesystem::path& path,
                                       Encoding encoding = Encoding::kAuto);
 
-// Three planes for normal maps and other data: floats exactly as stored, integers as a fraction of
-// full scale. kBadData unless the file has three or four channels.
+// Reads three planes for normal maps and other data: floats exactly as stored, integers as a
+// fraction of full scale. Fails with kBadData unless the file has three or four channels.
 [[nodiscard]] Result<Image3> ReadImage3(const std::filesystem::path& path);
 
-// 255 where any colour channel is at least half of full scale (1 for floats), otherwise 0.
+// Reads 255 where any colour channel is at least half of full scale (1 for floats), otherwise 0.
 [[nodiscard]] Result<Mask> ReadMask(const std::filesystem::path& path);
 
-// True for the file name endings that ReadPhoto reads.
+// Returns true for the file name endings that ReadPhoto reads.
 [[nodiscard]] bool IsPhotoName(const std::filesystem::path& path);
 
 // Writers give the same bytes for the same image. kIo where the file cannot be written whole; what
@@ -57,7 +57,7 @@ struct Photo {
 [[nodiscard]] Status WritePng16(const std::filesystem::path& path,
                                 const std::array<Image<uint16_t>, 3>& image);
 
-// The bytes of a JPEG file, sRGB, quality 90.
+// Returns the bytes of a JPEG file, sRGB, quality 90.
 [[nodiscard]] Result<std::string> EncodeJpeg(const std::array<Image<uint8_t>, 3>& image);
 
 }  // namespace sateen

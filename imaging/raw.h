@@ -42,7 +42,7 @@ struct RawReadings {
   }
 };
 
-// True for the file name endings of camera RAW files.
+// Returns true for the file name endings of camera RAW files.
 [[nodiscard]] bool IsRawName(const std::filesystem::path& path);
 
 /// Decodes a camera RAW file (through LibRaw): no auto brightness, no white balance, no
@@ -57,9 +57,9 @@ struct RawReadings {
 [[nodiscard]] Status TakeRawReadings(const std::filesystem::path& path,
                                      const std::function<Status(const RawReadings&)>& take);
 
-// Camera RGB at every pixel. Bilinear: the mean of the nearest sites of each colour; measured
-// values are kept as they are at their own sites. At the border the mosaic continues as its mirror
-// image about the outermost row or column, which keeps the colours in their places.
+// Returns camera RGB at every pixel. Bilinear: the mean of the nearest sites of each colour;
+// measured values are kept as they are at their own sites. At the border the mosaic continues as
+// its mirror image about the outermost row or column, which keeps the colours in their places.
 // Channels are multiplied by `white_balance`, which is 1 unless asked: pass the chart's, or
 // mosaic.camera_white_balance.
 [[nodiscard]] Image3 Demosaic(const RawMosaic& mosaic,

@@ -44,7 +44,7 @@ struct BlinnPhongSpec {
   Eigen::Vector3d f0 = Eigen::Vector3d::Constant(0.04);  // reflectance at normal incidence, [0, 1]
   double power = 64.0;                                   // n, [0, 1e6]
 
-  // kInvalidArgument names the first field out of range, with its value and its range.
+  // Fails with kInvalidArgument, which names the first field out of range, its value and its range.
   [[nodiscard]] Status Validate() const;
 };
 

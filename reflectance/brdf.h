@@ -9,8 +9,8 @@ class Brdf {
  public:
   virtual ~Brdf() = default;
 
-  // f_r(l, v) at normal n; unit vectors, l and v away from the surface. Zero where n . l <= 0.
-  // Red, green, blue. [1/sr]
+  // Returns f_r(l, v) at normal n; unit vectors, l and v away from the surface.
+  // Zero where n . l <= 0. Red, green, blue. [1/sr]
   [[nodiscard]] virtual Eigen::Vector3d Evaluate(const Eigen::Vector3d& n, const Eigen::Vector3d& l,
                                                  const Eigen::Vector3d& v) const = 0;
 
@@ -20,7 +20,7 @@ class Brdf {
   Brdf& operator=(const Brdf&) = default;
 };
 
-/// The share of light from `v`'s mirror image that leaves again, or, by reciprocity, of the
+/// Returns the share of light from `v`'s mirror image that leaves again, or, by reciprocity, of the
 /// light that arrives from everywhere and leaves towards v:
 ///
 ///     R(v) = integral over l of f_r(l, v) max(0, n . l) dl                                  (1)

@@ -21,7 +21,7 @@ namespace sateen {
 struct LambertSpec {
   Eigen::Vector3d albedo = Eigen::Vector3d::Constant(0.5);
 
-  // kInvalidArgument names the first field out of range, with its value and its range.
+  // Fails with kInvalidArgument, which names the first field out of range, its value and its range.
   [[nodiscard]] Status Validate() const;
 };
 

@@ -28,7 +28,7 @@ class EnvironmentBrdf {
  public:
   EnvironmentBrdf();
 
-  // {scale, bias}. n_v and alpha in [0, 1].
+  // Returns {scale, bias}. n_v and alpha in [0, 1].
   [[nodiscard]] Eigen::Vector2d ScaleAndBias(double n_v, double alpha) const;
 
   /// R = f0 scale + bias

@@ -12,7 +12,7 @@ struct SpecularSpec {
   Eigen::Vector3d f0 = Eigen::Vector3d::Constant(0.04);  // reflectance at normal incidence, [0, 1]
   double alpha = 0.5;                                    // roughness, [0.001, 1]
 
-  // kInvalidArgument names the first field out of range, with its value and its range.
+  // Fails with kInvalidArgument, which names the first field out of range, its value and its range.
   [[nodiscard]] Status Validate() const;
 };
 

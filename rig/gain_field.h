@@ -38,8 +38,9 @@ struct GainField {
 
   [[nodiscard]] double At(const Eigen::Vector2d& x_mm) const;
 
-  // kBadData names the first field out of range: finite numbers, spacing > 0, 4 to kMostFieldKnots
-  // columns and rows, as many gains, each above 0 and up to 100. `what` opens the message.
+  // Fails with kBadData, which names the first field out of range: finite numbers, spacing > 0, 4
+  // to kMostFieldKnots columns and rows, as many gains, each above 0 and up to 100. `what` opens
+  // the message.
   [[nodiscard]] Status Validate(std::string_view what) const;
 
   bool operator==(const GainField&) const = default;

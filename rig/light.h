@@ -60,7 +60,7 @@ struct Incident {
   Eigen::Vector3d e_rgb;  // irradiance on a surface that faces the light
 };
 
-/// The light that arrives at point x of the table frame, in millimetres:
+/// Returns the light that arrives at point x of the table frame, in millimetres:
 ///
 ///     distant   l constant,                e = phi                                        (1)
 ///     near      d = s - x, l = d / |d|,    e = phi (1000 mm / |d|)^2                      (2)

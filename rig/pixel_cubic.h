@@ -26,7 +26,7 @@ inline KnotPlace KnotPlaceOf(double pixel, int pixels, int intervals) {
   return {first, knot - first};
 }
 
-// The inverse: where knot number `knot` lies in the image.
+// Returns the inverse: where knot number `knot` lies in the image.
 inline double PixelOfKnot(double knot, int pixels, int intervals) {
   return knot * (pixels - 1) / intervals;
 }

@@ -6,7 +6,7 @@
 
 namespace sateen {
 
-/// Distance between neighbouring pixels on the table, at the middle of the image. [mm]
+/// Returns the distance between neighbouring pixels on the table, at the middle of the image. [mm]
 ///
 ///     u = (width - 1) / 2, v = (height - 1) / 2
 ///     pitch = sqrt(|(p(u + 1, v) - p(u, v)) x (p(u, v + 1) - p(u, v))|)

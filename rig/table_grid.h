@@ -17,22 +17,23 @@ namespace sateen {
 /// Cost     2 ns per pixel, after 0.02 s for 24 Mpx; TablePointOfPixel takes 110 ns
 class TableGrid {
  public:
-  // kBadData where a pixel of the camera does not see the table plane, or the lens bends so much
-  // that no reasonable grid follows it.
+  // Fails with kBadData where a pixel of the camera does not see the table plane, or the lens bends
+  // so much that no reasonable grid follows it.
   [[nodiscard]] static Result<TableGrid> Make(const Camera& camera);
 
-  // x and y of the table positions of the pixels of row `v`, from column 0 on.
+  // Fills in x and y of the table positions of the pixels of row `v`, from column 0 on.
   void Row(int v, std::span<float> x_mm, std::span<float> y_mm) const;
 
   [[nodiscard]] ImageSize Size() const { return size_px_; }
 
  private:
   TableGrid() = default;
-  // With so many intervals between knots; the outermost knots are the image's corner pixels.
+  // Makes a grid with so many intervals between knots; the outermost knots are the image's corner
+  // pixels.
   static Result<TableGrid> WithIntervals(const Camera& camera, int columns, int rows);
-  // Where the grid is farthest from the truth, among the middles of its cells.
+  // Returns the grid's largest error against the truth, among the middles of its cells.
   [[nodiscard]] double WorstErrorPx(const Camera& camera) const;
-  // The knots' columns interpolated at row v.
+  // Interpolates the knots' columns at row v.
   void KnotsAtRow(double v, std::vector<Eigen::Vector2d>& knots) const;
 
   ImageSize size_px_;

@@ -48,10 +48,10 @@ class SceneRenderer {
   //          kCancelled
   [[nodiscard]] static Result<SceneRenderer> Create(const Scene& scene, const Task& task = {});
 
-  // As every frame sees it before a bump.
+  // Returns the maps as every frame sees them before a bump.
   [[nodiscard]] const SurfaceMaps& Maps() const { return maps_; }
 
-  // The frame of light `light`, an index into the rig's, or with all lights off.
+  // Renders the frame of light `light`, an index into the rig's, or with all lights off.
   [[nodiscard]] Result<RenderedFrame> Render(std::optional<size_t> light, const Task& task = {});
 
  private:

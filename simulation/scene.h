@@ -88,7 +88,8 @@ struct Scene {
   Lens lens;
   uint64_t seed = 1;
 
-  // kInvalidArgument names the first thing out of range, by its key in a scene file.
+  // Fails with kInvalidArgument, which names the first thing out of range by its key in a scene
+  // file.
   [[nodiscard]] Status Validate() const;
 };
 

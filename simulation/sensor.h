@@ -37,16 +37,18 @@ struct Sensor {
   std::optional<double> full_well_electrons;  // > 0
   double read_noise_electrons = 0.0;          // >= 0
 
-  // f of (4).
+  // Returns f of (4).
   [[nodiscard]] double Compressed(double x) const;
   // Names the first field out of range, with its value and its range.
   [[nodiscard]] Status Validate() const;
 };
 
-// "nikon-d5100"; docs/simulation.md names the sources of its figures. Nothing for other names.
+// Returns the sensor "nikon-d5100"; docs/simulation.md names the sources of its figures. Returns
+// nothing for other names.
 [[nodiscard]] std::optional<Sensor> SensorNamed(std::string_view name);
 
-// The four Bayer orders by their first two by two sites: "RGGB", "GRBG", "GBRG", "BGGR".
+// Returns one of the four Bayer orders by its first two by two sites: "RGGB", "GRBG", "GBRG",
+// "BGGR".
 [[nodiscard]] std::optional<std::array<uint8_t, 4>> BayerNamed(std::string_view name);
 
 // Returns the sensor's readings of linear radiance. Each site's noise depends on `seed` and its

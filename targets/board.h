@@ -29,15 +29,15 @@ struct BoardSpec {
   std::string dictionary = {};
   bool legacy = false;
 
-  // As ParseBoardSpec() reads it.
+  // Returns the text as ParseBoardSpec() reads it.
   [[nodiscard]] std::string Text() const;
   [[nodiscard]] int CornerCount() const { return (columns - 1) * (rows - 1); }
   [[nodiscard]] Eigen::Vector3d CornerPoint(int id) const;
   [[nodiscard]] bool IsBlack(int column, int row) const;
   // Centres of the white squares in the order of their markers' ids.
   [[nodiscard]] std::vector<Eigen::Vector3d> MarkerCenters() const;
-  // True where the board turned by half a turn looks the same: chessboards with an even number of
-  // squares along both sides or an odd one along both.
+  // Returns true if the board turned by half a turn looks the same: chessboards with an even number
+  // of squares along both sides or an odd one along both.
   [[nodiscard]] bool IsSymmetric() const;
 };
 

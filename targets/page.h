@@ -33,13 +33,13 @@ struct Page {
 
 enum class PageFormat { kPdf, kSvg, kPng };
 
-/// The page as the bytes of a file, drawn by cairo; the same for the same page. A PNG has `dpi`
-/// pixels an inch.
+/// Returns the page as the bytes of a file, drawn by cairo; the same for the same page. A PNG has
+/// `dpi` pixels per inch.
 ///
 /// Errors   kIo: what cairo says
 [[nodiscard]] Result<std::string> DrawPage(const Page& page, PageFormat format, double dpi = 300.0);
 
-// The page as grey levels; the top left corner of the paper is that of pixel (0, 0).
+// Returns the page as grey levels; the top left corner of the paper is that of pixel (0, 0).
 [[nodiscard]] Image<uint8_t> PageImage(const Page& page, double dpi);
 
 }  // namespace sateen

@@ -7,7 +7,7 @@
 
 namespace sateen {
 
-/// Width and height of a paper as it is named, upright: "A4", "A3", "A2", "letter", or
+/// Returns width and height of a paper as it is named, upright: "A4", "A3", "A2", "letter", or
 /// "200x150mm".
 ///
 /// Errors   kInvalidArgument: another name; a side that is not 20 to 2000 mm

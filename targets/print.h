@@ -21,7 +21,7 @@ class Print {
 
   [[nodiscard]] const Eigen::Vector2d& SizeMm() const { return size_mm_; }
   [[nodiscard]] const std::vector<Eigen::AlignedBox2d>& BlackMm() const { return black_mm_; }
-  // Within the size: on the paper of a sheet, not on the white rim of a board.
+  // Returns true within the size: on the paper of a sheet, not on the white rim of a board.
   [[nodiscard]] bool Covers(const Eigen::Vector2d& at_mm) const {
     return (at_mm.array().abs() <= 0.5 * size_mm_.array()).all();
   }

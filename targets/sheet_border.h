@@ -21,11 +21,11 @@ struct SheetBorder {
   std::string dictionary = {};
   std::string paper = {};  // as it was named: "A4"; a size where it has no name
 
-  // As ParseSheetBorder() reads it.
+  // Returns the text as ParseSheetBorder() reads it.
   [[nodiscard]] std::string Text() const;
   // Centres of the markers in the order of their ids.
   [[nodiscard]] std::vector<Eigen::Vector3d> MarkerCenters() const;
-  // The inside, a sixth of a marker away from the markers.
+  // Returns the inside, a sixth of a marker away from the markers.
   [[nodiscard]] Eigen::AlignedBox2d BlankMm() const;
 };
 

@@ -8,7 +8,7 @@
 
 namespace sateen {
 
-// The parts of "charuco:10x7:25mm:18mm" between its colons.
+// Returns the parts of "charuco:10x7:25mm:18mm" between its colons.
 [[nodiscard]] std::vector<std::string_view> FieldsOf(std::string_view text);
 
 // Reads the whole of `text` as a number; false if it is not a number.
@@ -18,13 +18,13 @@ template <typename T>
   return error == std::errc() && end == text.data() + text.size();
 }
 
-// "10x7"
+// Reads "10x7".
 [[nodiscard]] bool ReadGrid(std::string_view text, int& columns, int& rows);
 
-// "25mm"
+// Reads "25mm".
 [[nodiscard]] bool ReadLength(std::string_view text, double& length_mm);
 
-// "200x150mm"
+// Reads "200x150mm".
 [[nodiscard]] bool ReadSize(std::string_view text, Eigen::Vector2d& size_mm);
 
 }  // namespace sateen

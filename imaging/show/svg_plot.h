@@ -21,7 +21,7 @@ struct PlotAxis {
   [[nodiscard]] std::vector<double> Ticks() const;
 };
 
-// Return pieces of SVG, a line each.
+// Return pieces of SVG, one line each.
 [[nodiscard]] std::string SvgText(double x, double y, std::string_view anchor,
                                   std::string_view text, std::string_view color = "#333333");
 [[nodiscard]] std::string SvgLine(double x1, double y1, double x2, double y2,

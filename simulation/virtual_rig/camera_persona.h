@@ -16,7 +16,7 @@ struct Property {
   uint64_t value = 0;
   std::vector<uint64_t> choices;  // any value, where empty
 
-  // The dataset that GetDevicePropDesc returns.
+  // Returns the dataset that GetDevicePropDesc returns.
   [[nodiscard]] std::string Description() const;
 };
 
@@ -40,7 +40,8 @@ struct Persona {
   [[nodiscard]] double ExposureSeconds(uint64_t value) const;
 };
 
-// "generic": PTP's own properties. "nikon": a D5100, by what such a camera says of itself.
+// Returns "generic", with PTP's own properties, or "nikon", a D5100 by what such a camera says of
+// itself.
 [[nodiscard]] std::optional<Persona> PersonaNamed(std::string_view name);
 
 }  // namespace sateen::ptp

@@ -15,7 +15,7 @@ namespace sateen {
 [[nodiscard]] Result<pid_t> StartCommand(const std::vector<std::string>& command,
                                          const std::map<std::string, std::string>& environment);
 
-// As a shell has it: 128 and the signal's number where it was killed.
+// Returns the exit status as a shell has it: 128 and the signal's number if it was killed.
 [[nodiscard]] int ExitStatusOf(int wait_status);
 
 }  // namespace sateen

@@ -72,28 +72,28 @@ class Chip {
   // Returns the bits per second that the firmware has set.
   [[nodiscard]] double BaudRate() const;
 
-  // Whether the pin is an output and high.
+  // Returns whether the pin is an output and high.
   [[nodiscard]] bool Drives(ChipPin pin) const;
-  // The share of time that output compare unit 'A' or 'B' of timer 0, 1 or 2 holds its pin high;
-  // less than 0 where the unit is not connected to its pin.
+  // Returns the share of time that output compare unit 'A' or 'B' of timer 0, 1 or 2 holds its pin
+  // high; less than 0 if the unit is not connected to its pin.
   [[nodiscard]] double Duty(int timer, char unit) const;
   // Drives an input from outside, from now on and over resets.
   void DriveInput(ChipPin pin, bool high);
 
   void Reset(ResetCause cause);
-  // From the next reset on.
+  // Takes effect from the next reset on.
   void PutBehind(BootLoader boot_loader);
   // Holds the chip in reset for `duration`, with RAM as it is; then it starts. A low supply voltage
   // does this, and, as far as the outputs see it, so does a boot loader that waits for a
   // programmer.
   void HoldInReset(SimTime duration, ResetCause cause);
-  // Time goes on, nothing runs, all outputs are released, bytes are lost.
+  // Cuts the power: time goes on, nothing runs, all outputs are released, bytes are lost.
   void PowerOff();
-  // A power-on reset, with RAM as the loss of power leaves it: full of 0xA5.
+  // Makes a power-on reset, with RAM as the loss of power leaves it: full of 0xA5.
   void PowerOn();
   [[nodiscard]] bool HasPower() const;
 
-  // EEPROM outlives every reset and the loss of power.
+  // Returns the EEPROM, which outlives every reset and the loss of power.
   [[nodiscard]] std::vector<uint8_t> Eeprom() const;
   void WriteEeprom(size_t address, uint8_t byte);
 

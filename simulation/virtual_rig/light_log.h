@@ -24,7 +24,7 @@ class LightLog {
   using Clock = std::chrono::steady_clock;
   using Time = Clock::time_point;
 
-  // All lights are off. `rise`: tau of (1), not negative.
+  // Starts with all lights off. `rise`: tau of (1), not negative.
   explicit LightLog(int lights, std::chrono::nanoseconds rise = {});
 
   // Records that the light is told `level` from `when` on. Call it in the order of time.
@@ -34,8 +34,8 @@ class LightLog {
   // Ends the log: nothing more will be told, and nobody waits for it any longer.
   void Close();
 
-  // Returns (2) for each light; the output at `begin` where `end` is not later. Waits until all is known.
-  // kTimeout: it is not within `longest`; kCancelled: closed.
+  // Returns (2) for each light; the output at `begin` where `end` is not later. Waits until all is
+  // known. kTimeout: it is not within `longest`; kCancelled: closed.
   [[nodiscard]] Result<std::vector<double>> MeanLevels(
       Time begin, Time end, std::chrono::milliseconds longest = std::chrono::seconds(10)) const;
 

@@ -28,8 +28,8 @@ struct LitScene {
 /// Reads a session of linear frames, as `sateen simulate SCENE --linear -o DIR` writes it: one
 /// frame of each light, and dark frames, whose mean is the ambient light and is in every lit frame.
 ///
-/// Memory   4 bytes per site for each light and once more; 12 per site besides while a frame is read,
-///          on each thread
+/// Memory   4 bytes per site for each light and once more; 12 per site besides while a frame is
+///          read, on each thread
 /// Errors   kIo: a file is absent or unreadable
 ///          kBadData: a file that is not what the session recorded; RAW or other frames that are
 ///          not linear radiance; a light without a frame, no dark frame; a camera of unknown size
@@ -37,11 +37,11 @@ struct LitScene {
 [[nodiscard]] Result<LitScene> ReadLitScene(const std::filesystem::path& dir, const Sensor& sensor,
                                             const Task& task = {});
 
-// The rig of such a session alone.
+// Reads the rig of such a session alone.
 [[nodiscard]] Result<Rig> ReadSceneRig(const std::filesystem::path& dir);
 
-// kBadData unless both have the same lights on the same channels and a camera of the same size.
-// `what` and `other` are their files.
+// Fails with kBadData unless both have the same lights on the same channels and a camera of the
+// same size. `what` and `other` are their files.
 [[nodiscard]] Status RequireSameRig(const Rig& rig, const std::string& what, const Rig& other_rig,
                                     const std::string& other);
 

@@ -13,7 +13,7 @@ class NormalQuantiles {
  public:
   static constexpr size_t kCount = 65536;
 
-  // The same table for all; made when first asked for.
+  // Returns the same table for all; it is made when first asked for.
   static const NormalQuantiles& Table();
 
   [[nodiscard]] float operator[](uint64_t random) const { return values_[random & 0xFFFFU]; }

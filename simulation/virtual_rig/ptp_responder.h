@@ -22,7 +22,8 @@ struct Packet;
 // A thread waits for connections, another one serves each.
 class PtpResponder {
  public:
-  // At any free port. Errors of VirtualCamera::Create(); kIo where the system refuses a port.
+  // Starts at any free port. Fails as VirtualCamera::Create(), and with kIo if the system refuses a
+  // port.
   static Result<std::unique_ptr<PtpResponder>> Start(VirtualCameraOptions options);
   PtpResponder(const PtpResponder&) = delete;
   PtpResponder& operator=(const PtpResponder&) = delete;
@@ -38,7 +39,7 @@ class PtpResponder {
   void Accept();
   void Serve(int socket);
   void ServeCommands(int socket);
-  // False where the connection is to end.
+  // Returns false if the connection is to end.
   bool Answer(int socket, const ptp::Packet& request);
   void SendEvent(uint16_t code, uint32_t parameter);
   void HangUp();

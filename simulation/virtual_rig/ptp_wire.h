@@ -75,11 +75,11 @@ class Writer {
     }
     return *this;
   }
-  // The low `size` bytes of `value`.
+  // Puts the low `size` bytes of `value`.
   Writer& PutSized(uint64_t value, size_t size);
-  // A count of UTF-16 units with the closing zero, then they; ASCII only. 0 where empty.
+  // Puts a count of UTF-16 units with the closing zero, then the units; ASCII only. 0 if empty.
   Writer& String(std::string_view text);
-  // The same without a count, as PTP/IP has names.
+  // Puts the same without a count, as PTP/IP has names.
   Writer& Name(std::string_view text);
   template <typename T>
   Writer& Array(const std::vector<T>& values) {
@@ -99,7 +99,7 @@ class Writer {
   std::string bytes_;
 };
 
-// `size` bytes at `offset`, little-endian; bytes beyond the end are 0.
+// Reads `size` bytes at `offset`, little-endian; bytes beyond the end are 0.
 [[nodiscard]] uint64_t Read(std::string_view bytes, size_t offset, size_t size);
 
 struct Packet {

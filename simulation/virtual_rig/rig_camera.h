@@ -49,8 +49,8 @@ class RigCamera {
   std::unique_ptr<PtpResponder> responder_;
 };
 
-// The sensor of a scene's rig as `options` say. kInvalidArgument: no such sensor, a level out of
-// range.
+// Returns the sensor of a scene's rig as `options` say. kInvalidArgument: no such sensor, a level
+// out of range.
 [[nodiscard]] Result<Sensor> SensorOf(const RigCameraOptions& options, const Rig& rig);
 
 }  // namespace sateen

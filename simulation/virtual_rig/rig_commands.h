@@ -25,15 +25,15 @@ class RigCommands {
   // `failed` is told, by whatever thread, of what was understood and then did not work.
   RigCommands(RigLoop& loop, std::function<void(const Error&)> failed);
 
-  // From now on there is a camera. Both must outlive the last call of this.
+  // Adds the camera from now on. Both must outlive the last call of this.
   void HasCamera(SceneCamera& scene, VirtualCamera& camera);
 
-  // kInvalidArgument for a line that is no command, or not of a rig as this one is.
+  // Fails with kInvalidArgument for a line that is no command, or not of a rig as this one is.
   [[nodiscard]] Result<RigAction> Parse(const std::string& line);
   // Does it; by the loop's thread.
   [[nodiscard]] Status Do(const std::string& line);
   // "N:COMMAND": when the Nth capture is asked for, before anything comes of it;
-  // "N+TIME:COMMAND", as "5+12ms:unplug": so long after that. kInvalidArgument.
+  // "N+TIME:COMMAND", as "5+12ms:unplug": that long after it. kInvalidArgument.
   [[nodiscard]] Status Schedule(const std::string& text);
 
   void Failed(const Error& error) const { failed_(error); }

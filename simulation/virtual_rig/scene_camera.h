@@ -43,30 +43,31 @@ class SceneCamera {
   SceneCamera& operator=(const SceneCamera&) = delete;
   ~SceneCamera();
 
-  // A DNG file. It depends on what was lit, the settings, and what has been done to the rig; not on
-  // the frame's number. Waits for a scene that is being read. Errors of LightLog::MeanLevels().
+  // Returns a DNG file. It depends on what was lit, the settings, and what has been done to the
+  // rig; not on the frame's number. Waits for a scene that is being read. Fails as
+  // LightLog::MeanLevels().
   [[nodiscard]] Result<std::string> Frame(const FrameRequest& request);
-  // Told of each frame, by the thread that asked for it.
+  // Sets the function that is told of each frame, by the thread that asked for it.
   void OnExposed(std::function<void(const ExposedFrame&)> told);
 
-  // Another object under the camera. kBadData, kIo: `dir` is no session of the same rig. It is read
-  // in the background, then `told` how that went; the former scene stays where it went wrong.
+  // Puts another object under the camera. kBadData, kIo: `dir` is no session of the same rig. It is
+  // read in the background, then `told` how that went; after a failure the earlier scene stays.
   [[nodiscard]] Status ChangeScene(const std::filesystem::path& dir,
                                    std::function<void(const Status&)> told);
 
-  // Channel of a light by its name or number. kInvalidArgument names the lights.
+  // Returns the channel of a light by its name or number. kInvalidArgument names the lights.
   [[nodiscard]] Result<int> ChannelOf(const std::string& light) const;
-  // Two channels' wiring: each lights what the other one did.
+  // Swaps two channels' wiring: each lights what the other one did.
   void Swap(int channel, int other);
-  // `channel` also lights what `other` does.
+  // Makes `channel` also light what `other` does.
   void Double(int channel, int other);
-  // The light that the rig has on this channel gives `factor` of its light.
+  // Makes the light that the rig has on this channel give `factor` of its light.
   void Dim(int channel, double factor);
-  // kInvalidArgument: the scene has no ambient light that could be more.
+  // Fails with kInvalidArgument if the scene has no ambient light that could be more.
   Status SetAmbient(double factor);
-  // From now on the picture lies further right and down, by so many pixels.
+  // Moves the picture right and down by so many pixels, from now on.
   void Nudge(double dx_px, double dy_px);
-  // On the next `frames` frames.
+  // Shades the next `frames` frames.
   void Shade(const PictureShade& shade, int frames);
 
  private:

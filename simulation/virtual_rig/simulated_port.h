@@ -52,7 +52,7 @@ class SimulatedPort : public BytePort {
 
  private:
   [[nodiscard]] Status CheckOpen() const;
-  // `bytes` as they come out of the other end of the line.
+  // Returns `bytes` as they come out of the other end of the line.
   std::vector<uint8_t> OverTheLine(std::span<const uint8_t> bytes);
 
   VirtualBoard& board_;

@@ -25,7 +25,7 @@ struct BoardWiring {
   std::optional<ChipPin> shutter;     // high closes the camera's release contact
 };
 
-// The wiring of our firmware for 14 or for 16 lights, from firmware/controller/pins.h.
+// Returns the wiring of our firmware for 14 or for 16 lights, from firmware/controller/pins.h.
 [[nodiscard]] const BoardWiring& ControllerWiring(int lights = 14);
 
 // From `time` on, `light` shines at `level`, a part of its full power.
@@ -70,7 +70,7 @@ class VirtualBoard {
   [[nodiscard]] SimTime Now() const { return chip_->Now(); }
   void RunUntil(SimTime time);
   void RunFor(SimTime duration) { RunUntil(Now() + duration); }
-  // In steps of `step` until `done` holds; false where it did not within `limit`.
+  // Runs in steps of `step` until `done` holds; false if it did not within `limit`.
   bool RunUntil(const std::function<bool()>& done, SimTime limit,
                 SimTime step = std::chrono::microseconds(50));
 
@@ -92,14 +92,14 @@ class VirtualBoard {
   void Reset(ResetCause cause = ResetCause::kExternal) { chip_->Reset(cause); }
   // Resets as opening the port does on an Uno, with a boot loader that takes its time.
   void ResetByHost(SimTime boot_loader) { chip_->HoldInReset(boot_loader, ResetCause::kExternal); }
-  // The supply voltage is too low for as long.
+  // Keeps the supply voltage too low for `duration`.
   void BrownOut(SimTime duration) { chip_->HoldInReset(duration, ResetCause::kBrownOut); }
   void Unplug() { chip_->PowerOff(); }
   void Plug();
   [[nodiscard]] uint64_t TimesPlugged() const { return times_plugged_; }
   [[nodiscard]] bool Plugged() const { return chip_->HasPower(); }
   [[nodiscard]] bool HasFlashSync() const { return wiring_.flash_sync.has_value(); }
-  // The camera closes its flash contact, or opens it; a board without the input does not notice.
+  // Closes the camera's flash contact, or opens it; a board without the input does not notice.
   void FlashSync(bool closed) {
     if (wiring_.flash_sync) {
       chip_->DriveInput(*wiring_.flash_sync, !closed);

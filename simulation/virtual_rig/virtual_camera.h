@@ -49,9 +49,9 @@ enum class CameraFault {
   kTwoFiles        // the file and another one beside it
 };
 
-// By its name in commands: "busy", "no-event", "late-event", "gone", "dropped-mid-file",
-// "short-transfer", "truncated-file", "card-full", "asleep", "wrong-exposure", "two-files", "none".
-// kInvalidArgument lists them.
+// Returns the fault by its name in commands: "busy", "no-event", "late-event", "gone",
+// "dropped-mid-file", "short-transfer", "truncated-file", "card-full", "asleep", "wrong-exposure",
+// "two-files", "none". kInvalidArgument lists them.
 [[nodiscard]] Result<CameraFault> CameraFaultNamed(std::string_view name);
 
 struct VirtualCameraOptions {
@@ -86,7 +86,7 @@ class VirtualCamera {
   // Told of every event, from a thread of the camera.
   using EventSink = std::function<void(uint16_t code, uint32_t parameter)>;
 
-  // kInvalidArgument: an unknown persona, no source.
+  // Fails with kInvalidArgument for an unknown persona or without a source.
   static Result<std::unique_ptr<VirtualCamera>> Create(VirtualCameraOptions options);
   VirtualCamera(const VirtualCamera&) = delete;
   VirtualCamera& operator=(const VirtualCamera&) = delete;
@@ -96,12 +96,12 @@ class VirtualCamera {
   [[nodiscard]] Answer Handle(uint16_t operation, const std::vector<uint32_t>& parameters,
                               std::string_view data, uint32_t transaction);
 
-  // The next `captures` captures that are asked for go wrong so.
+  // Makes the next `captures` captures that are asked for go wrong so.
   void Inject(CameraFault fault, int captures = 1);
   void Sleep();
   void Wake();
   [[nodiscard]] bool Asleep() const;
-  // As with the camera's own dials. False where it has no such property.
+  // Sets a property as with the camera's own dials. Returns false if it has no such property.
   bool SetProperty(uint16_t code, uint64_t value);
   [[nodiscard]] uint64_t PropertyValue(uint16_t code);
   [[nodiscard]] CameraReport Report() const;
@@ -126,7 +126,7 @@ class VirtualCamera {
   [[nodiscard]] FrameRequest NextFrame(CameraFault fault);
   uint32_t AddFile(const std::string& name, std::string bytes, CameraFault fault);
   void Say(uint16_t code, uint32_t parameter);
-  // False where the camera is switched off meanwhile.
+  // Returns false if the camera is switched off meanwhile.
   bool Wait(std::chrono::steady_clock::time_point until);
   [[nodiscard]] ptp::Property* Find(uint32_t code);
   [[nodiscard]] std::string ObjectInfo(const Object& object) const;

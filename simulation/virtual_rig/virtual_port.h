@@ -42,7 +42,7 @@ class VirtualPort {
   VirtualPort& operator=(VirtualPort&&) = delete;
   ~VirtualPort();
 
-  // The name of the pseudo terminal; empty while unplugged.
+  // Returns the name of the pseudo terminal; empty while unplugged.
   [[nodiscard]] const std::string& Terminal() const { return terminal_; }
   [[nodiscard]] const std::filesystem::path& Folder() const { return folder_; }
   // Returns the board's name for a program under port_preload.c.
@@ -58,7 +58,7 @@ class VirtualPort {
   void Send(const std::vector<uint8_t>& bytes, double board_baud);
 
   [[nodiscard]] uint64_t BytesLost() const { return bytes_lost_; }
-  // Whether somebody has the port open, as of the last Receive().
+  // Returns whether somebody has the port open, as of the last Receive().
   [[nodiscard]] bool InUse() const { return in_use_; }
 
  private:

@@ -50,7 +50,7 @@ TEST(FitPhotonTransfer, WeightsDoNotFollowTheNoiseOfVariances) {
   std::vector<TransferPoint> points = PointsAt(0.0, 1000.0, 4);
   for (size_t i = 0; i < points.size(); ++i) {
     points[i].variance_dn2 *=
-        i / 6 % 2 == 0 ? 1.3 : 0.7;  // 1 in the mean, of every colour and level
+        i / 6 % 2 == 0 ? 1.3 : 0.7;  // 1 on average, of every colour and level
   }
   const PhotonTransfer transfer = FitPhotonTransfer(points, true).value();
   EXPECT_NEAR(transfer.gain_dn_per_electron, kGain, 1e-9);

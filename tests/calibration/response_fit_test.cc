@@ -124,7 +124,7 @@ TEST(ResponseFit, SaysUpToWhereSheetsMayBeExposed) {
   for (double time_s = 0.008; time_s < 0.07; time_s *= 1.0625) {
     bench.times_s.push_back(time_s);
   }
-  // With a frame in the middle that is off its own time by more than what is asked, too.
+  // With a frame in the middle that is off its own time by more than the limit, too.
   for (const double flicker : {1.0, 1.003}) {
     bench.flicker = [flicker](size_t frame) { return frame == 13 ? flicker : 1.0; };
     for (const ChannelLinearity& channel : MustFit(bench).linearity.rgb) {

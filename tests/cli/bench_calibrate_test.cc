@@ -30,8 +30,8 @@ TEST(BenchCalibrate, MeasuresTheWholeChain) {
   }
   EXPECT_LT(json.at("rows")[1].at("position_mm"), json.at("rows")[0].at("position_mm"));
   EXPECT_EQ(json.at("raw_frames"), 55);
-  // At 0.6 mm per pixel demosaicing a twill of 1.6 mm is wrong by more than any of these lights, with
-  // the true ones too; what the calibration adds to that must not be seen.
+  // At 0.6 mm per pixel demosaicing a twill of 1.6 mm is wrong by more than any of these lights,
+  // with the true ones too; what the calibration adds to that must not be seen.
   ASSERT_EQ(json.at("fabric").size(), 4U);
   const double truth_deg = json.at("fabric")[0].at("low_frequency_deg");
   EXPECT_NEAR(json.at("fabric")[1].at("low_frequency_deg"), truth_deg, 0.02);

@@ -175,7 +175,7 @@ TEST(ShiftBetween, TellsNothingWithoutTexture) {
   EXPECT_EQ(ShiftBetween(flat, Image<float>(80, 58)).peak, 0.0);
 }
 
-// A weave of 16 px a yarn with a fine print, nudged by 0.4 px between frames 5 and 6: what the
+// A weave of 16 px per yarn with a fine print, nudged by 0.4 px between frames 5 and 6: what the
 // solve makes of it. Rendered at twice the size, because a pixel's one ray would not move with the
 // picture.
 TEST(LayOverFirst, MendsTheNormalsOfANudgedSession) {

@@ -106,7 +106,7 @@ TEST_F(CaptureTest, KeepsSettingsAndLevelInTheRecord) {
   EXPECT_NEAR(board_->Records()[3].highest_level, 0.5, 1e-9);
 }
 
-// The brightest light's 99.9th percentile comes to lie just below its goal, on a camera of third
+// The brightest light's 99.9th percentile lies just below its goal, on a camera of third
 // stops.
 TEST_F(CaptureTest, FindsTheExposure) {
   camera_.exposure_counts = true;
@@ -166,7 +166,7 @@ TEST_F(CaptureTest, ALightThatIsBrighterThanTheRigSaysShortensTheExposure) {
   EXPECT_TRUE(VerifySession(dir_, {}));
 }
 
-// A scene of three exposures a light, killed in the middle and gone on with; a frame of an earlier
+// A scene of three exposures per light, killed in the middle and continued; a frame of an earlier
 // plan does not stay.
 TEST_F(CaptureTest, BracketsAScene) {
   std::vector<Image3> images = LightImages(rig_);
@@ -370,7 +370,7 @@ TEST_F(CaptureTest, SwappedLightsAreNamedAndOnlyTheyAreTakenAgain) {
   EXPECT_THAT(error, IsError(ErrorCode::kBadData,
                              "frame of light 'led-2' is lit from the position of light 'led-7'"));
   EXPECT_THAT(error.message, HasSubstr("'led-7' is lit from the position of light 'led-2'"));
-  camera_.image_of_channel.clear();  // mended
+  camera_.image_of_channel.clear();  // fixed
   const Result<CaptureSummary> resumed = Resume();
   ASSERT_TRUE(resumed) << resumed.error().message;
   EXPECT_EQ(resumed->taken, 2);

@@ -55,7 +55,7 @@ TEST(Daemon, ACaptureByTheApiIsWholeAndTellsHowFarItIs) {
   EXPECT_EQ(*VerifySession(dir, {}), 14);
 }
 
-// Cancelled in the middle of a capture: off, and the session can be gone on with.
+// Cancelled in the middle of a capture: off, and the session can be continued.
 TEST(Daemon, CancellingACaptureTurnsTheLightOffAndKeepsItsFrames) {
   StressedDaemon daemon({});
   const std::filesystem::path dir = daemon.folder.Path() / "twill";
