@@ -73,7 +73,7 @@ int RoundTripHost(int count) {
   return 0;
 }
 
-// Through libserialport, the pseudo terminal and the paced simulator, as `sateen` would.
+// Measures through libserialport, the pseudo terminal and the paced simulator, as `sateen` would.
 Status MeasureRoundTrips(const std::string& self, int count) {
   std::error_code no_folder;
   std::string events =
@@ -178,7 +178,7 @@ Status MeasureRandomBytes(uint64_t count) {
   return {};
 }
 
-// How long the light is on after the host's last word.
+// Measures how long the light is on after the host's last word.
 Status MeasureSilence() {
   auto board = Start(kFirmware);
   if (!board) {

@@ -63,7 +63,8 @@ std::vector<json> EventsIn(const fs::path& file) {
   return events;
 }
 
-// Longest time, in seconds, that a light stayed on after `since`, by the pins of the board.
+// Returns the longest time, in seconds, that a light stayed on after `since`, by the pins of the
+// board.
 double LitAfter(const std::vector<json>& events, double since_s) {
   double last_off = since_s;
   for (const json& event : events) {
@@ -89,7 +90,7 @@ class CaptureBench {
  public:
   explicit CaptureBench(const fs::path& folder) : folder_(folder) {}
 
-  // False where it cannot be rendered.
+  // Renders a scene; false if it cannot be rendered.
   bool Render(const std::string& scene_file, const std::string& name) {
     const Outcome rendered = Shell(fmt::format("'{}' simulate '{}' --linear -o '{}'", kSateen,
                                                scene_file, (folder_ / name).string()));
@@ -107,7 +108,7 @@ class CaptureBench {
   [[nodiscard]] fs::path Session(const std::string& name) const { return folder_ / name; }
   [[nodiscard]] fs::path EventFile() const { return folder_ / "events.jsonl"; }
 
-  // A command under the rig; rig_options as "--at '5:camera busy'".
+  // Runs a command under the rig; rig_options as "--at '5:camera busy'".
   [[nodiscard]] Outcome OnRig(const std::string& rig_options, const std::string& command) const {
     return Shell(fmt::format("HOME='{}' '{}' run --scene '{}' --events '{}' {} -- {}",
                              folder_.string(), kRigProgram, scene_.string(), EventFile().string(),
@@ -132,7 +133,7 @@ class CaptureBench {
     return Shell(fmt::format("'{}' session verify '{}'", kSateen, Session(name).string())).status ==
            0;
   }
-  // Frame for frame.
+  // Compares frame for frame.
   [[nodiscard]] bool Same(const std::string& name, const std::string& other) const {
     return Shell(fmt::format("diff -r '{}/frames' '{}/frames'", Session(name).string(),
                              Session(other).string()))
@@ -145,7 +146,7 @@ class CaptureBench {
   fs::path scene_;
 };
 
-// Whole sessions of 16 megapixels.
+// Measures whole sessions of 16 megapixels.
 void MeasureSpeed(CaptureBench& bench, const fs::path& source, int sessions) {
   if (!bench.Render((source / "samples/scenes/twill-d5100.json").string(), "large")) {
     return;

@@ -236,7 +236,7 @@ void MeasureInMemory(ImageSize size, int repeats) {
   compare("ladder from mosaics", raw_ladder, rgb_ladder);
 }
 
-// A session of DNG files; false where the disk is too small.
+// Writes a session of DNG files; false if the disk is too small.
 bool WriteSession(const Capture& capture, const fs::path& dir) {
   sateen::Rig rig = capture.GetRig();
   // Files hold the fraction of full scale, divided by the exposure.

@@ -21,7 +21,7 @@ enum class Comparator {
 };
 
 [[nodiscard]] std::string_view Name(Comparator comparator);
-// Those that are worth their time on so many lights.
+// Returns those that are worth their time on so many lights.
 [[nodiscard]] std::vector<Comparator> ComparatorsFor(const Rig& rig);
 
 // Normals and reasons alone; usable samples are the solver's.

@@ -39,7 +39,7 @@ void KeepWords(GPContext* /*context*/, const char* text, void* words) {
   *static_cast<std::string*>(words) = text;
 }
 
-// "PTP/IP Camera" for network ports, and for USB whatever is at the port.
+// Finds "PTP/IP Camera" for network ports, and for USB whatever is at the port.
 int FindAbilities(const std::string& port, GPPortInfoList* ports, GPContext* context,
                   CameraAbilities& abilities) {
   CameraAbilitiesList* all = nullptr;
@@ -75,7 +75,7 @@ int FindAbilities(const std::string& port, GPPortInfoList* ports, GPContext* con
   return code;
 }
 
-// The errno of creating or writing the file; 0 where all of it is there.
+// Returns the errno of creating or writing the file; 0 if all of it is there.
 int WriteNewFile(const std::string& path, std::string_view bytes) {
   const int descriptor = open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
   if (descriptor < 0) {
@@ -337,7 +337,7 @@ json GphotoSession::Info(const std::string& folder, const std::string& name) {
   return {{"bytes", info.file.size}};
 }
 
-// By way of memory, because the library keeps to itself why it cannot write a file.
+// Downloads by way of memory, because the library does not tell why it cannot write a file.
 json GphotoSession::Download(const std::string& folder, const std::string& name,
                              const std::string& path) {
   CameraFile* raw = nullptr;

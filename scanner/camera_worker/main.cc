@@ -14,8 +14,8 @@
 // libgphoto2 that never returns hangs this process and not the capture.
 namespace {
 
-// When the program that started this one has ended, however that was, this process lets go of the
-// camera; where the library hangs just then, it ends all the same.
+// Waits until the program that started this one has ended, in whatever way. Then this process lets
+// go of the camera. It ends even if the library hangs just then.
 void EndWithParent() {
   pollfd parent = {.fd = STDIN_FILENO, .events = POLLRDHUP, .revents = 0};
   while (poll(&parent, 1, -1) <= 0) {

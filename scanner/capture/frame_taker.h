@@ -42,8 +42,8 @@ struct TakenFrame {
 /// After any failure all lights have been told to go off.
 class FrameTaker {
  public:
-  // `camera` is open; the board is connected where it is not. Of `options`: settle, margin,
-  // deadline, keep_alive.
+  // Needs an open `camera`; the board is connected where it is not. Uses settle, margin, deadline
+  // and keep_alive of `options`.
   FrameTaker(LightBoard& board, TetheredCamera& camera, const FrameSettings& settings,
              const CaptureOptions& options, const Task& task);
 

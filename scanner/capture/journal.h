@@ -68,7 +68,7 @@ struct Journal {
 ///          that cannot follow the ones before it. Only a last line without its newline is dropped.
 [[nodiscard]] Result<std::optional<Journal>> ReadJournal(const std::filesystem::path& dir);
 
-// The same from text; `where` opens messages.
+// Reads the same from text. `where` opens messages.
 [[nodiscard]] Result<std::optional<Journal>> ParseJournal(const std::string& text,
                                                           const std::string& where);
 

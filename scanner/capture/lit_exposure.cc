@@ -115,7 +115,7 @@ milliseconds OnTime(const LightBoard& board, const LitExposure& exposure,
   return channel < limits.size() ? std::min(wanted, limits[channel].max_on) : wanted;
 }
 
-// Step 1.
+// Does step 1.
 Status TurnOnAlone(LightBoard& board, const LitExposure& exposure, const CaptureOptions& options) {
   const Result<BoardState> state = exposure.light
                                        ? board.SetLight(exposure.light->channel, exposure.level,

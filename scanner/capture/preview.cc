@@ -23,7 +23,7 @@ constexpr double kPreviewPeak = 0.8;
 constexpr int kMostPreviewTests = 8;
 constexpr std::array<uint8_t, 3> kSaturatedInk = {255, 0, 255};
 
-// The light that is asked for, as the board switches it.
+// Finds the light that is asked for, as the board switches it.
 Result<std::optional<Light>> FindLight(const PreviewRequest& request,
                                        const std::optional<Rig>& rig) {
   if (!request.light) {
@@ -155,7 +155,7 @@ class PreviewShooter {
   const std::filesystem::path& folder_;
 };
 
-// Nothing where the request names none.
+// Reads the rig of the request. Reads nothing if it names none.
 Status ReadRigOf(const PreviewRequest& request, std::optional<Rig>& rig) {
   Status ready = request.Validate();
   if (ready && !request.rig.empty()) {

@@ -11,26 +11,28 @@
 // The parts of CheckCapture() that lay frames over each other. `on`: the lights that are on, alone.
 namespace sateen {
 
-// CaptureCheck::shifts. Of a light that is not on, infinitely uncertain.
+// Returns CaptureCheck::shifts. The shift of a light that is not on is infinitely uncertain.
 [[nodiscard]] std::vector<Shift> ShiftsOf(const Rig& rig, const CaptureLooks& looks,
                                           const std::vector<bool>& on,
                                           const FrameCheckOptions& options);
 
-// kMoved, of every frame: which frames have moved, and how far; nothing where none has too far.
+// Returns kMoved for every frame: which frames have moved, and how far. Returns nothing if none has
+// moved too far.
 [[nodiscard]] std::optional<CaptureFault> MovedFault(const Rig& rig,
                                                      const std::vector<Shift>& shifts,
                                                      const FrameCheckOptions& options);
 
-// The light whose frame alone has moved too far, while those after it have not.
+// Returns the light whose frame alone has moved too far, while those after it have not.
 [[nodiscard]] std::optional<std::size_t> OnlyOneThatMoved(const std::vector<Shift>& shifts,
                                                           const FrameCheckOptions& options);
 
-// kOtherLight: the frame of `light` is lit from where the rig has `other`.
+// Returns kOtherLight: the frame of `light` is lit from where the rig has `other`.
 [[nodiscard]] CaptureFault OtherLightFault(const Rig& rig, std::size_t light, std::size_t other);
 
-// kShaded, of one light each; kOtherLight where they have changed places, or one is lit as another
-// is, which on cloth that does not lie flat only normals show. `signal`: [light][block], dark
-// subtracted. Shadows that take less than `min_light` of all the light of a frame are left aside.
+// Returns kShaded, for one light each. Returns kOtherLight where lights have changed places, or one
+// is lit as another is, which on cloth that does not lie flat only normals show. `signal`:
+// [light][block], dark subtracted. Shadows that take less than `min_light` of all the light of a
+// frame are left aside.
 [[nodiscard]] std::vector<CaptureFault> ShadedFaults(const Rig& rig, const CaptureLooks& looks,
                                                      const std::vector<BlockField>& signal,
                                                      const std::vector<bool>& on,

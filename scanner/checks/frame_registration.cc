@@ -38,7 +38,7 @@ class Registration {
 
   [[nodiscard]] bool CanTell() const { return !levels_.empty() && !levels_[0].IsEmpty(); }
 
-  // From `shifts`, in cells, through the `levels` finest levels.
+  // Refines `shifts`, in cells, through the `levels` finest levels.
   void Refine(size_t levels, std::vector<Eigen::Vector2d> shifts) {
     for (size_t level = std::min(levels, levels_.size()); level-- > 0;) {
       const double cells = std::pow(2.0, static_cast<double>(level));

@@ -16,7 +16,7 @@ struct Shift {
   double sd_px = std::numeric_limits<double>::infinity();
 };
 
-// Beyond 3 standard deviations and 0.05 px: worth to be corrected.
+// Returns whether the shift is beyond 3 standard deviations and 0.05 px, and so worth correcting.
 [[nodiscard]] bool IsSignificant(const Shift& shift);
 
 // Frames to be laid over each other: pictures of one size in cells of 2 x 2 px.
@@ -26,7 +26,7 @@ struct FramesToRegister {
   std::function<Eigen::Vector3d(std::size_t k, const Eigen::Vector2d& cell)> light;
 };
 
-/// How each frame lies against the first, though each is lit from elsewhere. Within a tile of
+/// Finds how each frame lies against the first, though each is lit from elsewhere. Within a tile of
 /// 8 x 8 cells a Lambertian surface N = rho n, moved by d_k, gives
 ///
 ///     v_k(x) = i_k(x) / e_k = N(x) . (l_k + a_k) - grad v_k(x) . d_k                        (1)

@@ -11,7 +11,7 @@
 namespace sateen {
 namespace {
 
-// med_j log of (1), block by block, over the lights that are on.
+// Returns med_j log of (1), block by block, over the lights that are on.
 BlockField MedianLog(const std::vector<BlockField>& all, const std::vector<bool>& on) {
   BlockField median;
   for (std::size_t b = 0; b < all[0].size(); ++b) {
@@ -26,14 +26,14 @@ BlockField MedianLog(const std::vector<BlockField>& all, const std::vector<bool>
   return median;
 }
 
-// (1); not finite where a value is not above 0.
+// Returns (1); not finite where a value is not above 0.
 BlockField PatternOf(BlockField field, const BlockField& median_log) {
   std::ranges::transform(field, median_log, field.begin(),
                          [](double value, double median) { return std::log(value) - median; });
   return field;
 }
 
-// (2), over the blocks where both are known.
+// Returns (2), over the blocks where both are known.
 double Misfit(const BlockField& q, const BlockField& r) {
   double sum = 0.0;
   double sum2 = 0.0;

@@ -39,7 +39,7 @@ class LightPatterns {
   };
   [[nodiscard]] Fit FitOf(std::size_t k) const;
 
-  // The light that explains the frame of light k best where both are on.
+  // Returns the light that explains the frame of light k best where both are on.
   [[nodiscard]] std::optional<std::size_t> SecondLight(std::size_t k) const;
 
  private:

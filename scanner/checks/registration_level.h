@@ -16,10 +16,10 @@ class RegistrationLevel {
   RegistrationLevel(const std::vector<Image<float>>& frames, const FramesToRegister& input,
                     double cells);
 
-  // True where no tile has lights that tell of a surface.
+  // Returns whether no tile has lights that tell of a surface.
   [[nodiscard]] bool IsEmpty() const { return tiles_.empty(); }
 
-  // Mean of r of (3) over all cells: how badly the frames fit together at these shifts.
+  // Returns the mean of r of (3) over all cells: how badly the frames fit together at these shifts.
   [[nodiscard]] double Misfit(const std::vector<Eigen::Vector2d>& shifts);
 
   // Returns the share of the frames' variance that a surface explains, at the shifts of the last

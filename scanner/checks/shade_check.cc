@@ -87,7 +87,8 @@ class ShadeFinder {
   }
 
  private:
-  // (1). Levels first, or a light of another brightness than the rig says would bend every N.
+  // Solves (1). Levels come first, or a light of another brightness than the rig says would bend
+  // every N.
   bool PredictAll() {
     for (int round = 0; round < 2; ++round) {
       for (size_t b = 0; b < blocks_; ++b) {
@@ -104,7 +105,7 @@ class ShadeFinder {
     return true;
   }
 
-  // (1) at one block.
+  // Solves (1) at one block.
   void Predict(size_t b) {
     const auto rows = static_cast<Eigen::Index>(count_);
     Eigen::MatrixXd l(rows, 3);
@@ -145,7 +146,7 @@ class ShadeFinder {
     return (in_.light[k][b].normalized() + in_.view[b]).normalized().head<2>();
   }
 
-  // f and c_k of (2), with weights against what lies on a frame.
+  // Takes out f and c_k of (2), with weights against what lies on a frame.
   void TakeOutMaterial() {
     const auto frames = static_cast<Eigen::Index>(count_);
     const Eigen::Index size = kTerms + frames;
@@ -177,7 +178,7 @@ class ShadeFinder {
     }
   }
 
-  // From -1 to 1 over the picture.
+  // Returns the place of a block, from -1 to 1 over the picture.
   [[nodiscard]] Eigen::Vector2d PlaceOf(size_t b) const {
     const auto columns = static_cast<size_t>(in_.grid.columns);
     const size_t row = b / columns;
@@ -185,7 +186,7 @@ class ShadeFinder {
             2.0 * (static_cast<double>(row) + 0.5) / in_.grid.rows - 1.0};
   }
 
-  // z of (2) below its upper quarter.
+  // Returns the depth of z of (2) below its upper quarter.
   [[nodiscard]] BlockField DepthOf(BlockField z) const {
     Eigen::Vector3d plane = Eigen::Vector3d::Zero();
     for (int step = 0; step < 8; ++step) {
@@ -215,7 +216,7 @@ class ShadeFinder {
     return z;
   }
 
-  // 3 x 3 median.
+  // Returns the 3 x 3 median.
   [[nodiscard]] BlockField Smoothed(const BlockField& z) const {
     BlockField smooth(blocks_, kUnknown);
     std::vector<double> near;
@@ -245,7 +246,7 @@ class ShadeFinder {
     return b;
   }
 
-  // D: neighbouring blocks join from the deepest up, until kFewest are together.
+  // Returns D: neighbouring blocks join from the deepest up, until kFewest are together.
   [[nodiscard]] double StrengthOf(const BlockField& depth) const {
     std::vector<size_t> order;
     for (size_t b = 0; b < blocks_; ++b) {

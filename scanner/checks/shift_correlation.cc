@@ -10,7 +10,7 @@ namespace {
 
 constexpr double kHighPassPx = 3.0;  // standard deviation of what is taken out
 
-// 0 where none is.
+// Returns the mean of the finite cells; 0 if none is finite.
 float MeanOfFinite(const Image<float>& image) {
   double sum = 0.0;
   double count = 0.0;
@@ -21,7 +21,7 @@ float MeanOfFinite(const Image<float>& image) {
   return static_cast<float>(sum / std::max(count, 1.0));
 }
 
-// Texture alone, fading out towards the border, which wraps around.
+// Returns the texture alone, fading out towards the border, which wraps around.
 cv::Mat TextureOf(const Image<float>& image) {
   cv::Mat values(image.height, image.width, CV_32F);
   const float mean = MeanOfFinite(image);
@@ -36,7 +36,7 @@ cv::Mat TextureOf(const Image<float>& image) {
   return high.mul(window);
 }
 
-// Where the parabola through three values, 1 apart, is highest, from the middle one.
+// Returns where the parabola through three values, 1 apart, is highest, from the middle one.
 double TopOfParabola(double before, double middle, double after) {
   const double curvature = before - 2.0 * middle + after;
   return curvature < 0.0 ? std::clamp(0.5 * (before - after) / curvature, -0.5, 0.5) : 0.0;

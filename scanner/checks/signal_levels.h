@@ -17,7 +17,7 @@ struct SignalLevels {
   double saturated = 0.0;  // share of the sites that do
 };
 
-// To 1/4096. Sites are counted as the sensor reads them, without white balance.
+// Measures the levels to 1/4096. Sites are counted as the sensor reads them, without white balance.
 [[nodiscard]] SignalLevels LevelsOf(const RawMosaic& mosaic, const SensorReading& reading);
 [[nodiscard]] SignalLevels LevelsOf(const Photo& photo);
 

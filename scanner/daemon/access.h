@@ -30,7 +30,7 @@ class AccessRules {
  public:
   AccessRules(std::string token, int port);
 
-  // The refusal; nothing where the request is let in.
+  // Returns the refusal, or nothing if the request is let in.
   [[nodiscard]] std::optional<ApiResponse> Check(const AccessHeaders& headers) const;
 
  private:
@@ -38,10 +38,10 @@ class AccessRules {
   int port_;
 };
 
-// Without looking at where they differ; their lengths are no secret.
+// Compares without looking at where they differ. Their lengths are no secret.
 [[nodiscard]] bool SameInConstantTime(const std::string& a, const std::string& b);
 
-/// The token: the file's first line.
+/// Reads the token: the file's first line.
 ///
 /// Errors  kIo: it cannot be read; kInvalidArgument: others than its owner may read or write it, it
 ///         is not the user's own, or the token is not of 16 to 512 printable characters without

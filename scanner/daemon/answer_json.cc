@@ -30,7 +30,7 @@ std::string OneLine(const ordered_json& json) {
   return json.dump(-1, ' ', false, ordered_json::error_handler_t::replace);
 }
 
-// "2026-11-26T06:31:07Z"
+// Returns "2026-11-26T06:31:07Z".
 std::string TimeText(system_clock::time_point time) {
   const std::time_t seconds = system_clock::to_time_t(time);
   std::tm utc = {};

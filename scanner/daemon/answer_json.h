@@ -20,32 +20,32 @@ namespace sateen {
 [[nodiscard]] std::string StateJson(const RigState& state, const std::string& version);
 [[nodiscard]] std::string JobJson(const JobRecord& job);
 [[nodiscard]] std::string JobsJson(const std::vector<JobRecord>& jobs);
-// {"id": 7, "events": "/v1/jobs/7/events"}
+// Writes {"id": 7, "events": "/v1/jobs/7/events"}.
 [[nodiscard]] std::string BegunJson(std::uint64_t id);
 [[nodiscard]] Result<std::uint64_t> BegunFromJson(const std::string& text);
 
-// {"error": {"code": "device", "message": ...}}, and the job that has the rig, where one has.
+// Writes {"error": {"code": "device", "message": ...}}, and the job that has the rig, if any.
 [[nodiscard]] std::string ErrorJson(const Error& error,
                                     const std::optional<JobRecord>& holder = std::nullopt);
-// The error that such a text tells of; another text is a kBadData itself.
+// Reads the error from such a text. Another text is itself a kBadData.
 [[nodiscard]] Error ErrorFromJson(const std::string& text);
-// "invalid-argument", "bad-data", "degenerate", "io", "device", "timeout", "cancelled".
+// Returns "invalid-argument", "bad-data", "degenerate", "io", "device", "timeout" or "cancelled".
 [[nodiscard]] std::string_view Name(ErrorCode code);
-// "the rig is in use: capture of scans/twill by ... since 06:31:07 (job 7); ..."
+// Returns "the rig is in use: capture of scans/twill by ... since 06:31:07 (job 7); ..."
 [[nodiscard]] std::string BusyText(const JobRecord& holder);
 
 [[nodiscard]] std::string EventJson(const CaptureEvent& event);
 [[nodiscard]] Result<CaptureEvent> CaptureEventFromJson(const std::string& text);
-// The session itself is on disk, in session.json.
+// Writes the summary without the session, which is on disk in session.json.
 [[nodiscard]] std::string SummaryJson(const CaptureSummary& summary);
-// The session is not filled in.
+// Reads the summary. Its session is not filled in.
 [[nodiscard]] Result<CaptureSummary> SummaryFromJson(const std::string& text);
 
-// Request and plan are not in it: who asks knows them.
+// Writes the forecast without request and plan, which the client knows.
 [[nodiscard]] std::string ForecastToJson(const CaptureForecast& forecast);
 [[nodiscard]] Result<CaptureForecast> ForecastFromJson(const std::string& text);
 
-// Without the picture; where it was written, if it was.
+// Writes the preview without the picture, and where the picture was written, if it was.
 [[nodiscard]] std::string PreviewJson(const Preview& preview, const std::filesystem::path& output);
 [[nodiscard]] Result<Preview> PreviewAnswerFromJson(const std::string& text);
 

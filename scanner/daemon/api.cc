@@ -27,7 +27,7 @@ std::string OwnerName(const std::string& client, const std::string& who) {
   return client.empty() ? who : fmt::format("{} ({})", client, who);
 }
 
-// Where `path` has the form of `pattern`, "/v1/jobs/{}": what stands in the place of {}.
+// Returns what stands in the place of {} if `path` has the form of `pattern`, "/v1/jobs/{}".
 std::optional<std::string> Match(std::string_view pattern, std::string_view path) {
   const std::size_t place = pattern.find("{}");
   if (place == std::string_view::npos) {
@@ -242,7 +242,8 @@ ApiResponse Api::GetEvents(const ApiRequest& request, Parameter id) const {
               ApiResponse::Events{.job = job->id, .after = request.last_event_id.value_or(0)}};
 }
 
-// Safety: never refused for a job that runs; it is cancelled, and so is one that gets in between.
+// Turns all lights off. For safety it is never refused for a job that runs: that job is cancelled,
+// and so is one that gets in between.
 ApiResponse Api::PostLightsOff(const ApiRequest& request, Parameter /*none*/) const {
   const auto deadline = std::chrono::steady_clock::now() + options_.off_wait;
   while (true) {

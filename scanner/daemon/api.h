@@ -32,7 +32,7 @@ struct ApiResponse {
   std::optional<Events> events;
 };
 
-// The answer to a refused request: the status, and an error in JSON.
+// Returns the answer to a refused request: the status, and an error in JSON.
 [[nodiscard]] ApiResponse Refused(int status, const Error& error);
 // Returns 400, 422, 500, 503 or 504.
 [[nodiscard]] int HttpStatus(ErrorCode code);

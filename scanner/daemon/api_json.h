@@ -20,7 +20,7 @@ struct PostedCapture {
   CaptureRequest request;
   bool dry_run = false;  // only what it would do
 };
-// "capture", "preview" or "solve"; empty where the text does not say.
+// Returns "capture", "preview" or "solve"; empty where the text does not say.
 [[nodiscard]] std::string KindOfJob(const std::string& text);
 // Reads a capture request. Absent keys are as in `defaults`.
 [[nodiscard]] Result<PostedCapture> CaptureFromJson(const std::string& text,

@@ -35,7 +35,7 @@ class Connection {
   // Returns whether the client is still there.
   [[nodiscard]] bool IsOpen() const;
 
-  // "process 4711 (sateen) of alice" on a Unix socket, "127.0.0.1 port 51234" on TCP.
+  // Returns "process 4711 (sateen) of alice" on a Unix socket, "127.0.0.1 port 51234" on TCP.
   [[nodiscard]] std::string PeerName() const;
 
  private:

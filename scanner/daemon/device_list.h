@@ -11,7 +11,7 @@
 
 namespace sateen {
 
-// A serial port or a camera, and what it said when it was asked.
+// A serial port or a camera, and its answer.
 struct DeviceReply {
   std::string port;
   std::string usb;  // USB id of a serial port: "2341:0043"; empty: not on USB
@@ -34,7 +34,8 @@ struct DeviceReply {
 void TakeBoard(DeviceReply& reply, const BoardInfo& info);
 void TakeCamera(DeviceReply& reply, const CameraInfo& info);
 
-// The object of `sateen devices --json` (docs/formats.md), and back. An indent below 0: one line.
+// Writes the object of `sateen devices --json` (docs/formats.md), and reads it back. An indent
+// below 0 gives one line.
 [[nodiscard]] std::string DevicesJson(const std::vector<DeviceReply>& devices, int indent);
 [[nodiscard]] Result<std::vector<DeviceReply>> DevicesFromJson(const std::string& text);
 

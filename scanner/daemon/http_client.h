@@ -25,12 +25,12 @@ class DaemonClient {
  public:
   explicit DaemonClient(std::filesystem::path socket);
 
-  // The answer's body.
+  // Sends a request and returns the answer's body.
   [[nodiscard]] Result<std::string> Ask(const std::string& method, const std::string& path,
                                         const std::string& body = "") const;
 
   // Posts the job, tells `observer` of its progress, cancels it when the task is cancelled, and
-  // waits for its end; its result.
+  // waits for its end. Returns its result.
   [[nodiscard]] Result<std::string> RunJob(const std::string& path, const std::string& body,
                                            const std::function<void(const JobEvent&)>& observer,
                                            const Task& task) const;
@@ -41,33 +41,33 @@ class DaemonClient {
   std::filesystem::path socket_;
 };
 
-/// The daemon that is running, if one is: at $SATEEN_SOCKET where that is set, and where it is
-/// empty none; else at $XDG_RUNTIME_DIR/sateen.sock, else at /run/sateen/sateen.sock. A socket at
-/// which nobody answers, or to which the user may not connect, is no daemon.
+/// Returns the running daemon, if any: at $SATEEN_SOCKET if that is set (none if it is empty); else
+/// at $XDG_RUNTIME_DIR/sateen.sock, else at /run/sateen/sateen.sock. A socket at which nobody
+/// answers, or to which the user may not connect, is no daemon.
 ///
 /// Errors  kTimeout, kBadData: something answers there, but not as a daemon does
 [[nodiscard]] Result<std::optional<DaemonClient>> FindDaemon();
 
-// RunCapture by the daemon; paths are made absolute. Of the summary the session is the one on disk.
+// Runs RunCapture in the daemon. Paths are made absolute. The summary's session is the one on disk.
 [[nodiscard]] Result<CaptureSummary> CaptureByDaemon(const DaemonClient& daemon,
                                                      const CaptureRequest& request,
                                                      const Task& task,
                                                      const CaptureObserver& observer = {});
-// ForecastCapture by the daemon.
+// Runs ForecastCapture in the daemon.
 [[nodiscard]] Result<CaptureForecast> ForecastByDaemon(const DaemonClient& daemon,
                                                        const CaptureRequest& request);
-// TakePreview by the daemon, into the file `output`; the answer has no picture.
+// Runs TakePreview in the daemon, into the file `output`. The answer has no picture.
 [[nodiscard]] Result<Preview> PreviewByDaemon(const DaemonClient& daemon,
                                               const PreviewRequest& request,
                                               const std::filesystem::path& output,
                                               const Task& task);
-// KeepLightOn by the daemon. kCancelled: somebody else turned it off.
+// Runs KeepLightOn in the daemon. kCancelled: somebody else turned it off.
 [[nodiscard]] Result<bool> KeepLightOnByDaemon(const DaemonClient& daemon,
                                                const LightRequest& request, const Task& task,
                                                const std::function<void(const LightOn&)>& began);
 [[nodiscard]] Result<BoardWord> ChangeBoardByDaemon(const DaemonClient& daemon,
                                                     const BoardChange& change);
-// Also when a job runs, which it cancels.
+// Turns all lights off, also while a job runs, which it cancels.
 [[nodiscard]] Status LightsOffByDaemon(const DaemonClient& daemon);
 [[nodiscard]] Result<std::vector<DeviceReply>> DevicesByDaemon(const DaemonClient& daemon);
 

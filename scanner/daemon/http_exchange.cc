@@ -27,7 +27,7 @@ ApiResponse RefusedBody(int status, std::string message) {
   return Refused(status, {ErrorCode::kInvalidArgument, std::move(message)});
 }
 
-// One event as server-sent events have it.
+// Writes one event in the form of server-sent events.
 std::string EventText(const JobEvent& event) {
   return fmt::format("id: {}\nevent: {}\ndata: {}\n\n", event.sequence, event.type, event.data);
 }

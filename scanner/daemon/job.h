@@ -41,12 +41,12 @@ struct JobRecord {
 class JobContext {
  public:
   virtual ~JobContext() = default;
-  // Board and camera; only of a job that has the rig.
+  // Returns board and camera; only for a job that has the rig.
   [[nodiscard]] virtual RigDevices& Devices() = 0;
   [[nodiscard]] virtual const Task& GetTask() const = 0;
   // Sends one line of JSON to those who follow the job. From any thread.
   virtual void Report(std::string json) = 0;
-  // Before a light goes on: the channels that may be on from now on.
+  // Records, before a light goes on, the channels that may be on from now on.
   virtual void Lit(std::vector<int> channels) = 0;
 };
 

@@ -40,7 +40,7 @@ Result<Lit> StayUntilOff(LightBoard& board, int channel, const Task& task) {
   }
 }
 
-// "500 ms" below a second, else in seconds.
+// Returns "500 ms" below a second, else the time in seconds.
 std::string OnTimeText(milliseconds time) {
   return time < milliseconds(1000)
              ? fmt::format("{} ms", time.count())

@@ -27,8 +27,8 @@ struct LightOn {
 };
 
 /// Turns the light on and stays with it, since the board turns off when it hears nothing, until it
-/// goes off or the task is cancelled; then the light is off. `began` is told once it is on; of
-/// level 0 it is not called.
+/// goes off or the task is cancelled; then the light is off. `began` is called once it is on.
+/// It is not called for level 0.
 ///
 /// Errors   kDevice: a fault of the board; the light's limit came before anybody cancelled, where
 ///          no time was asked for; kInvalidArgument, kTimeout as LightBoard

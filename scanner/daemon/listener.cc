@@ -24,7 +24,7 @@ constexpr int kBacklog = 64;
 
 sockaddr* Generic(void* address) { return static_cast<sockaddr*>(address); }
 
-// Whether somebody answers at the socket: then it is not one that was left behind.
+// Returns whether somebody answers at the socket. If so, it was not left behind.
 bool IsAlive(sockaddr_un& address) {
   const int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
   const bool connected =
@@ -60,7 +60,7 @@ Status RemoveStale(const std::filesystem::path& path, sockaddr_un& address) {
                                           path.string(), SystemReason(errno));
 }
 
-// Bound so that the file has mode 0600 from its first moment.
+// Binds the socket so that its file has mode 0600 from its first moment.
 Status BindPrivately(int fd, sockaddr_un& address) {
   const mode_t mask = umask(0177);
   const bool bound = bind(fd, Generic(&address), sizeof address) == 0;

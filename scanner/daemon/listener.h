@@ -10,15 +10,14 @@ namespace sateen {
 // A socket that waits for connections, on this computer only. Owns its descriptor and its file.
 class Listener {
  public:
-  /// On a Unix socket that only its owner, and root, may connect to: the file is made with mode
-  /// 0600. A file `path`.lock is locked for as long as this lives, so that of two daemons that
-  /// start at once one wins; the socket that a killed daemon left is replaced.
+  /// Listens on a Unix socket to which only its owner, and root, may connect: the file is made with
+  /// mode 0600. A file `path`.lock is locked for as long as this lives, so that one of two daemons
+  /// that start at once wins. The socket that a killed daemon left is replaced.
   ///
   /// Errors  kDevice: a daemon has this socket; kIo: something else is there, or the system
-  ///         refuses;
-  ///         kInvalidArgument: longer than the system's 107 bytes
+  ///         refuses; kInvalidArgument: longer than the system's 107 bytes
   [[nodiscard]] static Result<Listener> OnUnixSocket(const std::filesystem::path& path);
-  /// "127.0.0.1:8377", "localhost:8377" or "[::1]:8377"; port 0 takes a free one.
+  /// Listens on "127.0.0.1:8377", "localhost:8377" or "[::1]:8377"; port 0 takes a free one.
   ///
   /// Errors  kInvalidArgument: another address; kIo: the port is in use
   [[nodiscard]] static Result<Listener> OnLoopback(const std::string& address);
@@ -28,9 +27,9 @@ class Listener {
   ~Listener();
 
   [[nodiscard]] int Descriptor() const { return fd_; }
-  // 0 of a Unix socket.
+  // Returns the port; 0 for a Unix socket.
   [[nodiscard]] int Port() const { return port_; }
-  // "unix:/run/user/1000/sateen.sock", "http://127.0.0.1:8377"
+  // Returns "unix:/run/user/1000/sateen.sock" or "http://127.0.0.1:8377".
   [[nodiscard]] const std::string& Name() const { return name_; }
 
  private:
@@ -43,7 +42,7 @@ class Listener {
   std::string name_;
 };
 
-// $XDG_RUNTIME_DIR/sateen.sock; without that folder /run/sateen/sateen.sock.
+// Returns $XDG_RUNTIME_DIR/sateen.sock; without that folder /run/sateen/sateen.sock.
 [[nodiscard]] std::filesystem::path DefaultSocketPath();
 
 }  // namespace sateen

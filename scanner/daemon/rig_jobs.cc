@@ -52,7 +52,7 @@ Result<std::string> DoLightsOff(JobContext& job) {
   return off ? Result<std::string>(R"({"lit":[]})") : tl::unexpected(off.error());
 }
 
-// The one with this port; a new one at the end where the system does not show it.
+// Returns the device at this port; a new one at the end if the system does not show it.
 DeviceReply& PlaceOf(std::vector<DeviceReply>& devices, const DeviceReply& named) {
   const auto found = std::ranges::find(devices, named.port, &DeviceReply::port);
   return found != devices.end() ? *found : devices.emplace_back(named);

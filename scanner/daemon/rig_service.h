@@ -70,17 +70,17 @@ class RigService {
   RigService& operator=(const RigService&) = delete;
   ~RigService();  // Stop()
 
-  // The job's number.
+  // Begins a job and returns its number.
   [[nodiscard]] tl::expected<std::uint64_t, JobRefusal> Begin(JobRequest request);
-  // Begins it and waits for its end.
+  // Begins a job and waits for its end.
   [[nodiscard]] tl::expected<JobRecord, JobRefusal> RunToEnd(JobRequest request);
 
   [[nodiscard]] RigState State() const;
   [[nodiscard]] std::vector<JobRecord> Jobs() const;
   [[nodiscard]] std::optional<JobRecord> Find(std::uint64_t id) const;
 
-  // The events after the one numbered `after`, at once if there are any, else when one comes or
-  // `longest` has passed. Nothing for a job that is not known.
+  // Returns the events after the one numbered `after`: at once if there are any, else when one
+  // comes or `longest` has passed. Returns nothing for an unknown job.
   [[nodiscard]] std::optional<FollowedEvents> Follow(std::uint64_t id, std::uint64_t after,
                                                      std::chrono::milliseconds longest) const;
 
@@ -111,7 +111,7 @@ class RigService {
   [[nodiscard]] Lane& LaneOf(const JobRecord& job) { return job.has_rig ? rig_ : desk_; }
   void RunJobs(Lane& lane);
   [[nodiscard]] Result<std::string> Work(Job& job);
-  // The board's word that all is off; what is wrong where it cannot be had.
+  // Asks the board to confirm that all is off. Returns what is wrong if it cannot.
   [[nodiscard]] std::string ConfirmLightsOff();
   void NoteRig(std::string lights_fault);                     // with the mutex held
   void End(Job& job, Result<std::string> result);             // with the mutex held

@@ -17,7 +17,7 @@ constexpr milliseconds kHelloInterval{100};
 // 65 bytes of EEPROM at 3.4 ms, and then some.
 constexpr milliseconds kSlowExtra{400};
 
-// "SET_LIGHT" as people read it.
+// Returns a name such as "SET_LIGHT" as people read it.
 std::string Words(std::string_view name) {
   std::string words(name);
   std::ranges::transform(words, words.begin(), [](unsigned char letter) {

@@ -85,7 +85,7 @@ class BoardLink {
 
   [[nodiscard]] Wire Encode(std::uint8_t message, std::span<const std::uint8_t> payload);
   [[nodiscard]] Status Write(const Wire& wire);
-  // The next frame, good or not; status NONE when the deadline has passed.
+  // Reads the next frame, good or not; status NONE when the deadline has passed.
   [[nodiscard]] Result<Frame> ReadFrame(BytePort::Duration deadline);
   // Waits for the answer with the sequence number last encoded. kGreeting: one that was not asked
   // for, so the board has just started.

@@ -25,7 +25,7 @@ struct CameraProfile {
   std::vector<RequiredSetting> required;
 };
 
-// The profile for what the camera says of itself; "generic" where no other fits.
+// Returns the profile for what the camera says of itself; "generic" if no other fits.
 [[nodiscard]] const CameraProfile& ProfileFor(std::string_view manufacturer);
 
 // Returns the number that a camera's word for a setting means: "1/60", "0.0166s", "13/10", "f/8",

@@ -10,9 +10,9 @@
 
 namespace sateen {
 
-// By its name, as people write it: "usb:001,004", "ptpip:192.168.1.1", "folder:DIR"; empty: the
-// only camera on USB when it is opened. A caller that decodes every frame anyway asks for no
-// decoding here. kInvalidArgument for other names.
+// Makes a camera by its name, as people write it: "usb:001,004", "ptpip:192.168.1.1", "folder:DIR";
+// empty: the only camera on USB when it is opened. A caller that decodes every frame anyway asks
+// for no decoding here. kInvalidArgument for other names.
 [[nodiscard]] Result<std::unique_ptr<TetheredCamera>> MakeTetheredCamera(const std::string& name,
                                                                          bool decode = true);
 

@@ -7,11 +7,12 @@
 
 namespace sateen {
 
-// An error as the worker reports it, in words with what to do: of libgphoto2, {"code", "text",
-// "while"}, a kDevice; of this computer's disk, {"errno", "path"}, a kIo.
+// Returns an error that the worker reports, in words with what to do: of libgphoto2, {"code",
+// "text", "while"}, a kDevice; of this computer's disk, {"errno", "path"}, a kIo.
 [[nodiscard]] Error FromLibrary(const nlohmann::json& error, const std::string& port);
 
-// Also where it may be gone: a connection that broke is kUnspecified as often as not.
+// Returns whether the connection is, or may be, gone: a connection that broke is kUnspecified as
+// often as not.
 [[nodiscard]] bool ConnectionIsGone(const nlohmann::json& error);
 
 // Returns whether the memory card is full, which only a person can fix.

@@ -71,7 +71,8 @@ Status CheckChannel(int channel, const BoardInfo& info) {
   return {};
 }
 
-// In [0, 1] and not so small that rounding to thousandths makes it 0; NaN is neither.
+// Fails unless the level is in [0, 1] and not so small that rounding to thousandths makes it 0. NaN
+// fails.
 Status CheckLevel(double level) {
   if (!(level >= 0.0 && level <= 1.0) || (level > 0.0 && level < 0.5 / SATEEN_FULL_LEVEL)) {
     return Fail(ErrorCode::kInvalidArgument,
@@ -84,7 +85,7 @@ std::uint16_t PermilleOf(double level) {
   return static_cast<std::uint16_t>(std::lround(level * SATEEN_FULL_LEVEL));
 }
 
-// Everything that the board would refuse for its limits, in words that name the light.
+// Checks everything that the board would refuse for its limits, in words that name the light.
 Status CheckLight(int channel, double level, milliseconds on_time, const BoardInfo& info) {
   Status valid = CheckChannel(channel, info);
   if (valid) {

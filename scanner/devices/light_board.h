@@ -136,7 +136,7 @@ class LightBoard {
                                             std::chrono::milliseconds on_time, bool add = false);
   [[nodiscard]] Result<BoardState> AllOff();
   [[nodiscard]] Result<BoardReport> Report();
-  // The next flash sync turns the light on for on_time, once.
+  // Makes the next flash sync turn the light on for on_time, once.
   [[nodiscard]] Result<BoardState> Arm(int channel, double level,
                                        std::chrono::milliseconds on_time);
   [[nodiscard]] Result<BoardState> TriggerShutter(std::chrono::milliseconds press);
@@ -144,7 +144,7 @@ class LightBoard {
   [[nodiscard]] Result<BoardState> Limit(int channel, const LightLimits& limits);
   [[nodiscard]] Result<BoardState> Configure(const BoardSettings& settings);
   [[nodiscard]] Result<BoardState> ClearFault(int fault);
-  // Firmware of a test build hangs after its answer, with interrupts on or off.
+  // Makes the firmware of a test build hang after its answer, with interrupts on or off.
   [[nodiscard]] Result<BoardState> Hang(bool interrupts);
 
  private:

@@ -101,7 +101,7 @@ class PtpCamera : public TetheredCamera {
   std::optional<ExposureSettings> set_;
 };
 
-// All cameras on USB that libgphoto2 knows.
+// Lists all cameras on USB that libgphoto2 knows.
 [[nodiscard]] Result<std::vector<FoundCamera>> ListPtpCameras(
     const std::filesystem::path& worker = {});
 

@@ -30,21 +30,23 @@ class RigDevices {
   RigDevices& operator=(const RigDevices&) = delete;
   ~RigDevices();
 
-  // Connected; what was lost is connected anew. kDevice: none, or it does not answer.
+  // Returns the connected board; what was lost is connected anew. kDevice: none, or it does not
+  // answer.
   [[nodiscard]] Result<LightBoard*> Board();
-  // Whether a board has ever answered: then a light of it may be on.
+  // Returns whether a board has ever answered: then a light of it may be on.
   [[nodiscard]] bool BoardHasAnswered() const { return board_has_answered_; }
-  // Open; what was lost is opened anew. kDevice: none, or it cannot be used, and how to fix it.
+  // Returns the open camera; what was lost is opened anew. kDevice: none, or it cannot be used, and
+  // how to fix it.
   [[nodiscard]] Result<TetheredCamera*> Camera();
-  // So that Camera() opens it anew: after an error that may have been its own.
+  // Closes the camera after an error that may have been its own, so that Camera() opens it anew.
   void CloseCamera() noexcept;
   // Returns the camera's answer on opening; nothing where it is not open.
   [[nodiscard]] const std::optional<CameraInfo>& OpenCamera() const { return camera_info_; }
 
-  // All lights off, where there is a board that answers. kDevice, kTimeout: it does not, and turns
-  // everything off by itself within 2 s.
+  // Turns all lights off, where there is a board that answers. kDevice, kTimeout: it does not, and
+  // turns everything off by itself within 2 s.
   [[nodiscard]] Status LightsOff();
-  // All lights off, both devices closed.
+  // Turns all lights off and closes both devices.
   void Release() noexcept;
 
  private:

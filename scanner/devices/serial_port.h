@@ -25,13 +25,13 @@ struct SerialPortInfo {
   bool may_be_board = false;
 };
 
-// All ports, by name. kDevice where the system does not tell.
+// Lists all ports, by name. kDevice where the system does not tell.
 [[nodiscard]] Result<std::vector<SerialPortInfo>> ListSerialPorts();
 
-// The one port that may be an LED board. kDevice: there is none, or more than one.
+// Finds the one port that may be an LED board. kDevice: there is none, or more than one.
 [[nodiscard]] Result<std::string> FindBoardPort();
 
-// A port by its name, or, with an empty name, the one that FindBoardPort finds whenever it is
+// Makes a port by its name, or, with an empty name, the one that FindBoardPort finds whenever it is
 // opened: after it was unplugged and plugged in again its name may be another. 500 kbaud, and no
 // other program may open it meanwhile. Over libserialport.
 [[nodiscard]] std::unique_ptr<BytePort> MakeSerialPort(std::string name);

@@ -11,10 +11,10 @@ namespace sateen {
 // Messages between this program and the process that talks to the camera, over a socket: a length
 // of four bytes, little-endian, then JSON of at most 1 MiB.
 
-// kDevice: the other side is gone.
+// Sends a message. kDevice: the other side is gone.
 [[nodiscard]] Status SendMessage(int socket, const nlohmann::json& message);
-// kTimeout: nothing, or not all of it, within `longest`, which is for ever where absent; kDevice:
-// the other side is gone, or sent what is no message.
+// Receives a message. kTimeout: nothing, or not all of it, within `longest`, which is for ever
+// where absent; kDevice: the other side is gone, or sent what is no message.
 [[nodiscard]] Result<nlohmann::json> ReceiveMessage(
     int socket, std::optional<std::chrono::milliseconds> longest);
 

@@ -14,22 +14,23 @@ namespace sateen {
 // the socket of its messages. Move-only.
 class WorkerProcess {
  public:
-  // sateen-camera-worker beside this program, or in ../lib/sateen or ../libexec/sateen from it.
+  // Returns sateen-camera-worker beside this program, or in ../lib/sateen or ../libexec/sateen from
+  // it.
   [[nodiscard]] static std::filesystem::path DefaultProgram();
 
-  // kIo: it cannot be started.
+  // Starts the program. kIo: it cannot be started.
   [[nodiscard]] static Result<WorkerProcess> Start(const std::filesystem::path& program);
   WorkerProcess(WorkerProcess&& other) noexcept;
   WorkerProcess& operator=(WorkerProcess&& other) noexcept;
   ~WorkerProcess() { Kill(); }
 
-  // One request and its answer. kTimeout: none within `longest`; the process is killed then,
-  // because a later answer would be taken for that of another request. kDevice: the process has
-  // ended.
+  // Sends one request and returns its answer. kTimeout: none within `longest`; the process is
+  // killed then, because a later answer would be taken for that of another request. kDevice: the
+  // process has ended.
   [[nodiscard]] Result<nlohmann::json> Ask(const nlohmann::json& request,
                                            std::chrono::milliseconds longest);
   [[nodiscard]] bool Running() const { return process_ > 0; }
-  // With SIGKILL, since what it hangs in may take no notice of less; waits until it is gone.
+  // Kills it with SIGKILL, since a hung call may ignore less, and waits until it is gone.
   void Kill() noexcept;
 
  private:

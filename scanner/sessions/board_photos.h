@@ -39,9 +39,9 @@ struct BoardPicture {
   std::map<std::string, std::string> sha256_of_input;
 };
 
-/// Grey levels of one photograph: those of an 8-bit file as they are; otherwise linear light, the
-/// mean of the session's lit frames, with its 99.5th percentile as white and the curve of sRGB.
-/// Corners do not move under any curve.
+/// Reads the grey levels of one photograph: those of an 8-bit file as they are; otherwise linear
+/// light, the mean of the session's lit frames, with its 99.5th percentile as white and the curve
+/// of sRGB. Corners do not move under any curve.
 ///
 /// Errors   kIo, kBadData: as ReadPhoto(), ReadRawMosaic(); a recorded hash that differs; frames of
 ///          different sizes; no light in the picture

@@ -30,7 +30,7 @@ Looked LookAt(const BoardPhoto& photo, const BoardSpec& spec) {
   return looked;
 }
 
-// The size that most pictures have, of equally frequent ones the first.
+// Returns the size that most pictures have; the first of equally frequent ones.
 ImageSize CommonSize(const std::vector<Looked>& all) {
   ImageSize common;
   std::ptrdiff_t most = 0;

@@ -71,7 +71,7 @@ Result<ReadPlan> PlanByPath(const fs::path& path, const ReadDatasetOptions& opti
       path.string(), DescribeFolder(path));
 }
 
-// The rig that the caller gives instead of the lights of a public layout.
+// Reads the rig that the caller gives instead of the lights of a public layout.
 Status ReplaceRig(const fs::path& rig_file, ReadPlan& plan) {
   Result<Rig> rig = ReadRig(rig_file);
   if (!rig) {
@@ -149,7 +149,7 @@ Status SelectLights(const std::vector<int>& wanted, ReadPlan& plan) {
   return {};
 }
 
-// Every light has a frame, and no file serves two of them.
+// Fails unless every light has a frame and no file serves two of them.
 Status CheckLitFrames(const fs::path& path, const ReadPlan& plan) {
   std::set<fs::path> seen;
   for (size_t k = 0; k < plan.lit.size(); ++k) {
@@ -218,7 +218,7 @@ Status CheckCamera(const Dataset& dataset) {
   return {};
 }
 
-// Mask and truth, which must fit the frames.
+// Adds mask and truth, which must fit the frames.
 Status AddCompanions(const ReadPlan& plan, Dataset& dataset) {
   if (plan.mask) {
     if (Status status = ReadMaskInto(plan, dataset); !status) {
@@ -235,7 +235,7 @@ Status AddCompanions(const ReadPlan& plan, Dataset& dataset) {
   return {};
 }
 
-// As colours or as mosaics.
+// Reads the frames as colours or as mosaics.
 Status ReadFrames(const ReadPlan& plan, const ReadDatasetOptions& options, const Task& task,
                   Dataset& dataset) {
   const std::optional<std::string> why_not = WhyNoMosaics(plan);

@@ -29,7 +29,8 @@ void SumAlong(bool rows, int stride, Image<float>& image) {
   }
 }
 
-// The mean of what is not saturated among the samples of one kind around each; at least one is.
+// Returns the mean of what is not saturated among the samples of one kind around each; at least one
+// is.
 Image<float> MeanAround(const Image<float>& readings, float saturation, int stride) {
   Image<float> sums = readings;
   Image<float> counts(readings.Size());

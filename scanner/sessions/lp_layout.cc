@@ -12,7 +12,7 @@ namespace fs = std::filesystem;
 
 constexpr LengthRange kDomeLengths = {1e-3, 1e6};  // positions on a dome, in any unit
 
-// Where a named image is on this machine: often the name is the author's path, of either system.
+// Finds a named image on this machine: often the name is the author's path, of either system.
 Result<fs::path> FindImage(const std::string& name, const fs::path& dir, std::string_view place) {
   std::string slashed = name;
   std::replace(slashed.begin(), slashed.end(), '\\', '/');

@@ -48,8 +48,8 @@ Status CheckDiligentTables(const DiligentTables& tables, const fs::path& dir) {
   });
 }
 
-// The photographs of a folder. Cameras write RAW and JPEG side by side: RAW files count where there
-// is nothing else, and are otherwise left out with a warning.
+// Returns the photographs of a folder. Cameras write RAW and JPEG side by side: RAW files count
+// where there is nothing else, and are otherwise left out with a warning.
 std::vector<std::string> SelectImages(const std::vector<std::string>& names, ReadPlan& plan) {
   std::vector<std::string> images;
   std::vector<std::string> raws;

@@ -40,7 +40,7 @@ struct TileNoise {
   double variance_dn2 = 0.0;
 };
 
-// (1) for one site of the pattern; nothing where a reading is cut off at either end.
+// Returns (1) for one site of the pattern; nothing where a reading is cut off at either end.
 std::optional<TileNoise> NoiseOfTile(const RawReadings& a, const RawReadings& b, int left, int top,
                                      size_t site) {
   const auto black = static_cast<double>(a.black[site]);
@@ -97,7 +97,7 @@ std::array<std::vector<TileNoise>, 3> NoiseOfTiles(const RawReadings& a, const R
   return tiles;
 }
 
-// The median tile of each group of about equally bright ones.
+// Adds the median tile of each group of about equally bright ones.
 void AddGroups(std::vector<TileNoise> tiles, size_t colour, bool is_dark,
                std::vector<TransferPoint>& points) {
   std::ranges::sort(tiles, {}, &TileNoise::mean_dn);

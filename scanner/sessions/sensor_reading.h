@@ -28,14 +28,15 @@ struct SensorReading {
     return balance[colour] * (v + shift);  // (1)
   }
   [[nodiscard]] float Largest() const;
-  // Where the last channel saturates.
+  // Returns where the last channel saturates.
   [[nodiscard]] float FullScale() const { return Largest() * (saturation + shift); }
 };
 
-// For a camera RAW file. kBadData where the rig's levels cannot be those of the file.
+// Returns the reading of a camera RAW file. kBadData where the rig's levels cannot be those of the
+// file.
 [[nodiscard]] Result<SensorReading> ReadingOf(const FrameFile& file, const RawMosaic& mosaic);
 
-// For other files, whose levels are no business of the sensor's: the balance alone.
+// Returns the reading of other files, whose levels are not the sensor's: the balance alone.
 [[nodiscard]] SensorReading ReadingOf(const FrameFile& file);
 
 }  // namespace sateen

@@ -15,7 +15,7 @@ namespace fs = std::filesystem;
 
 constexpr const char* kJournalName = "journal.jsonl";
 
-// With a factor known for some frames only, the others would come out in another unit.
+// Fails if a factor is known for some frames only: the others would come out in another unit.
 Status CheckFactors(const std::vector<SessionFrame>& frames, const std::string& where) {
   using Factor = std::pair<const char*, std::optional<double> SessionFrame::*>;
   for (const auto& [key, factor] :

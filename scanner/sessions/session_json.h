@@ -12,13 +12,13 @@
 namespace sateen {
 
 [[nodiscard]] SessionKind ReadSessionKind(JsonReader& json, std::string_view key);
-// 64 lower-case hexadecimal digits; nothing where the key is absent.
+// Reads 64 lower-case hexadecimal digits; nothing where the key is absent.
 [[nodiscard]] std::optional<std::string> ReadHash(JsonReader& json, std::string_view key);
-// Not empty.
+// Reads a file name that is not empty.
 [[nodiscard]] std::string ReadFileName(JsonReader& json, std::string_view key);
 // Role, and light of all but a dark frame.
 void ReadRoleAndLight(JsonReader& json, SessionFrame& frame);
-// A frame as session.json has it; the caller calls Finish().
+// Reads a frame as session.json has it; the caller calls Finish().
 [[nodiscard]] SessionFrame ReadSessionFrame(JsonReader& json);
 
 [[nodiscard]] nlohmann::ordered_json RoleAndLightToJson(const SessionFrame& frame);

@@ -77,7 +77,8 @@ Status AddToLight(const FrameFile& file, const SessionFrame& frame, const Sessio
   return {};
 }
 
-// With another aperture or ISO the picture, or the sensor's noise, is another one.
+// Fails if frames of one light differ in aperture or ISO: then the picture, or the sensor's noise,
+// is another one.
 Status CheckSettings(const Session& session, const std::string& where) {
   std::map<std::string, const SessionFrame*> first;
   for (const SessionFrame& frame : session.frames) {
@@ -151,8 +152,8 @@ Result<std::optional<RepeatedLight>> FindRepeat(const fs::path& dir, const ReadP
   return std::nullopt;
 }
 
-// A calibrated rig differs from the one that the session was captured with by what a ruler is wrong
-// by; more than that is another rig.
+// Returns the differences that make it another rig. A calibrated rig differs from the rig of the
+// capture only by what a ruler is wrong by.
 std::vector<std::string> DifferencesOf(const Rig& given, const Rig& own) {
   std::vector<std::string> differences;
   if (given.camera && own.camera && given.camera->model != own.camera->model) {

@@ -49,7 +49,7 @@ std::optional<Eigen::Vector3d> SheetPointOfPixel(const Camera& camera,
   return t > 0.0 ? std::optional<Eigen::Vector3d>(eye_mm + t * *ray) : std::nullopt;
 }
 
-// Whether a block shows nothing but the blank inside of the sheet.
+// Returns whether a block shows nothing but the blank inside of the sheet.
 bool IsBlank(const Camera& camera, const Eigen::Isometry3d& table_from_sheet,
              const Eigen::AlignedBox2d& extent_px, const SheetBorder& border) {
   using Corner = Eigen::AlignedBox2d::CornerType;

@@ -13,7 +13,7 @@ namespace {
 constexpr double kPaperShare =
     0.75;  // share of the sites of a colour that are darker: a bright place of paper
 
-// Each colour times what makes the paper grey.
+// Returns each colour times what makes the paper grey.
 Image<float> BalancedMosaic(RawMosaic mosaic) {
   std::array<std::vector<float>, 3> of_colour;
   const auto colour_at = [&](int x, int y) {

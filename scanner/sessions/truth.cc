@@ -47,8 +47,9 @@ uint32_t LittleEndian32(std::string_view bytes, size_t at) {
   return value;
 }
 
-// matio gives zeros for what is missing at the end of a file. A MATLAB 5 file is 128 bytes, the
-// last two "IM", then elements of 8 bytes (type, length) and `length` bytes each, to its end.
+// Fails unless the file is whole: matio gives zeros for what is missing at the end of a file. A
+// MATLAB 5 file is 128 bytes, the last two "IM", then elements of 8 bytes (type, length) and
+// `length` bytes each, to its end.
 Status CheckMatWhole(const fs::path& path) {
   const Result<std::string> bytes = ReadFileBytes(path);
   if (!bytes) {

@@ -22,10 +22,10 @@ struct TruthFiles {
   std::optional<std::filesystem::path> albedo;
 };
 
-// normal_gt.exr, else Normal_gt.mat, in a folder of a public data set.
+// Finds normal_gt.exr, else Normal_gt.mat, in a folder of a public data set.
 [[nodiscard]] std::optional<TruthFiles> FindPublicTruth(const std::filesystem::path& dir);
 
-// truth/normal.exr and truth/albedo.exr in the folder of a simulated session.
+// Finds truth/normal.exr and truth/albedo.exr in the folder of a simulated session.
 [[nodiscard]] std::optional<TruthFiles> FindSessionTruth(const std::filesystem::path& dir);
 
 /// Reads normals (an image, or a MATLAB file with the H x W x 3 doubles `Normal_gt`) and albedo.

@@ -11,9 +11,10 @@
 
 namespace sateen {
 
-// The outlines of spheres as a person marked them: a line "x y radius" for each, in pixels, centres
-// at integers from 0, y down; or, with one number per line, x, y and radius in turn, 1-based and y up
-// (circle_data.txt of PSBox). kBadData where it is neither, or a radius is not positive.
+// Reads the outlines of spheres as a person marked them: a line "x y radius" for each, in pixels,
+// centres at integers from 0, y down; or, with one number per line, x, y and radius in turn,
+// 1-based and y up (circle_data.txt of PSBox). kBadData where it is neither, or a radius is not
+// positive.
 [[nodiscard]] Result<std::vector<Circle>> ReadCircles(
     const std::filesystem::path& path, ImageSize size,
     std::map<std::string, std::string>& sha256_of_input);

@@ -17,17 +17,19 @@ namespace sateen {
 [[nodiscard]] Result<std::vector<std::string>> FilesInNaturalOrder(
     const std::filesystem::path& dir);
 
-// mask.png, cat.mask.tga, cat_mask.png: photographs by their ending, masks by their name.
+// Returns whether it is a mask, as mask.png, cat.mask.tga, cat_mask.png: photographs by their
+// ending, masks by their name.
 [[nodiscard]] bool IsMaskName(std::string_view name);
 
-// ref.jpg, reference.png: a picture by room light beside the photographs.
+// Returns whether it is a picture by room light beside the photographs, as ref.jpg, reference.png.
 [[nodiscard]] bool IsReferenceName(std::string_view name);
 
-// The one mask in `dir`; kBadData where several could be meant.
+// Finds the one mask in `dir`; kBadData where several could be meant.
 [[nodiscard]] Result<std::optional<std::filesystem::path>> FindMask(
     const std::filesystem::path& dir);
 
-// The first mask.* in `dir`, a folder that need not be ours: nothing where it cannot be listed.
+// Finds the first mask.* in `dir`, a folder that need not be ours: nothing where it cannot be
+// listed.
 [[nodiscard]] std::optional<std::filesystem::path> FindSharedMask(const std::filesystem::path& dir);
 
 // Describes the contents of the folder for messages: "12 files (10 .png, 2 .txt), 1 folder".
@@ -36,7 +38,7 @@ namespace sateen {
 // Returns false also where the path cannot be looked at; reading it will then say why.
 [[nodiscard]] bool Exists(const std::filesystem::path& path);
 
-// ASCII only: the file name endings and words that we look for.
+// Converts ASCII only: enough for the file name endings and words that we look for.
 [[nodiscard]] std::string LowerCase(std::string_view text);
 
 }  // namespace sateen

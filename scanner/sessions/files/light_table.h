@@ -23,8 +23,9 @@ inline constexpr LengthRange kUnitLengths = {0.99, 1.01};  // files round to as 
 [[nodiscard]] Status CheckWidths(const std::vector<NumberRow>& rows, size_t width,
                                  std::string_view needed);
 
-// Distant lights "light-0", "light-1", ... from rows of a direction (3 values) or a direction and
-// an RGB intensity (6 values). kBadData where a length or an intensity is out of range.
+// Returns distant lights "light-0", "light-1", ... from rows of a direction (3 values) or a
+// direction and an RGB intensity (6 values). kBadData where a length or an intensity is out of
+// range.
 [[nodiscard]] Result<Lights> LightsFromRows(const std::vector<NumberRow>& rows,
                                             LengthRange lengths);
 

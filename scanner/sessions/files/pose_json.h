@@ -12,7 +12,8 @@
 
 namespace sateen {
 
-// 16 numbers, row-major, of a rigid motion; nothing where the key is absent. For .cc files only.
+// Reads 16 numbers, row-major, of a rigid motion; nothing where the key is absent. For .cc files
+// only.
 [[nodiscard]] std::optional<Eigen::Isometry3d> ReadTransform(JsonReader& json,
                                                              std::string_view key);
 [[nodiscard]] std::vector<double> RowMajor(const Eigen::Isometry3d& transform);
@@ -21,7 +22,7 @@ namespace sateen {
 // sateen.pose/1.
 constexpr const char* kTruePoseFile = "truth/pose.json";
 [[nodiscard]] std::string TruePoseToJson(const Eigen::Isometry3d& table_from_target);
-// Nothing where there is no such file; kIo, kBadData where it cannot be read.
+// Reads the true pose; nothing if there is no such file. kIo, kBadData: it cannot be read.
 [[nodiscard]] Result<std::optional<Eigen::Isometry3d>> ReadTruePose(
     const std::filesystem::path& dir);
 

@@ -13,7 +13,7 @@ constexpr std::string_view kBlanks = " \t\r\v\f";
 constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
 constexpr size_t kMaxShown = 40;
 
-// The word as a message can show it, whatever bytes a wrong file holds.
+// Returns the word as a message can show it, whatever bytes a wrong file holds.
 std::string Show(std::string_view word) {
   std::string shown(word.substr(0, kMaxShown));
   for (char& c : shown) {

@@ -22,12 +22,12 @@ struct NumberRow {
   std::vector<double> values;
 };
 
-// The lines of a text file that are not blank; LF or CRLF, with or without a UTF-8 byte order
+// Reads the lines of a text file that are not blank; LF or CRLF, with or without a UTF-8 byte order
 // mark. Adds the file's hash to `sha256_of_input`. kIo where the file cannot be read.
 [[nodiscard]] Result<std::vector<TextLine>> ReadTextLines(
     const std::filesystem::path& path, std::map<std::string, std::string>& sha256_of_input);
 
-// The words of a line; blanks and tabs divide them.
+// Returns the words of a line, which blanks and tabs divide.
 [[nodiscard]] std::vector<std::string_view> SplitWords(std::string_view line);
 
 // kBadData names the first word that is not a finite number.
