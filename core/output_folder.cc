@@ -48,7 +48,7 @@ std::string Advice(int error_number) {
   }
 }
 
-// A new, empty, hidden folder in `dir`, so on the same file system.
+// Makes a new, empty, hidden folder in `dir`, so on the same file system.
 Result<fs::path> MakeStagingDir(const fs::path& dir) {
   std::string name = (dir / ".sateen-XXXXXX").string();
   if (mkdtemp(name.data()) == nullptr) {
@@ -59,7 +59,7 @@ Result<fs::path> MakeStagingDir(const fs::path& dir) {
   return fs::path(name);
 }
 
-// The missing folders on the way to `dir` are made and appended to `created`.
+// Makes the missing folders on the way to `dir` and appends them to `created`.
 Status MakeFolders(const fs::path& dir, std::vector<fs::path>& created) {
   fs::path folder;
   for (const fs::path& part : dir) {
@@ -106,7 +106,7 @@ class Moves {
   std::vector<std::pair<fs::path, fs::path>> done_;
 };
 
-// Old files go to `aside`, the last name (the record) first; then the new ones come in, the record
+// Moves old files to `aside`, the last name (the record) first; then the new ones in, the record
 // last, so that at no moment it stands beside files that it does not describe.
 Status PutInPlace(const fs::path& from, const fs::path& to, const std::vector<std::string>& names,
                   const std::vector<std::string>& retired, const std::vector<fs::path>& folders,

@@ -12,7 +12,7 @@ struct Quantity {
   std::string_view unit;
 };
 
-// A plain decimal number and what follows it.
+// Splits the text into a plain decimal number and what follows it.
 std::optional<Quantity> Split(std::string_view text) {
   Quantity quantity;
   const char* end = text.data() + text.size();

@@ -57,7 +57,7 @@ class CheckedFile final : public OIIO::Filesystem::IOProxy {
   }
   [[nodiscard]] size_t size() const override { return size_; }
   void flush() const override {}
-  // The first error of all, 0 for none; the file is closed.
+  // Returns the first error of all, 0 for none; the file is closed.
   int Finish() {
     if (file_ != nullptr) {
       Note(std::fclose(std::exchange(file_, nullptr)) == 0);

@@ -166,7 +166,8 @@ class DngWriter {
     good_ = good_ && TIFFSetField(tiff_.get(), tag, values...) == 1;
   }
 
-  // Before the picture's own directory, which names its place. 0 where there is nothing to say.
+  // Writes it before the picture's own directory, which names its place. Returns 0 if there is
+  // nothing to write.
   uint64_t WriteExif(const DngHeader& header) {
     if (!header.exposure_s && !header.f_number && !header.iso && !header.date_time) {
       return 0;

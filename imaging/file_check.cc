@@ -35,7 +35,7 @@ class FileProbe {
   void Need(uint64_t offset, uint64_t count) {
     needed_bytes_ = std::max(needed_bytes_, offset + count);
   }
-  // An unsigned integer of `width` bytes; nothing where the file ends before it.
+  // Reads an unsigned integer of `width` bytes; nothing if the file ends before it.
   std::optional<uint32_t> Read(uint64_t offset, size_t width) {
     Need(offset, width);
     unsigned char bytes[4] = {};
@@ -136,8 +136,8 @@ class TiffWalk {
                       fields[kTileOffsets].size();
   }
 
-  // The entry's values where they are `wanted` and SHORT, LONG or IFD. They are in the entry itself
-  // if they fit.
+  // Returns the entry's values where they are `wanted` and SHORT, LONG or IFD. They are in the
+  // entry itself if they fit.
   std::vector<uint32_t> Values(uint64_t entry, bool wanted) {
     const uint32_t type = probe_.Read(entry + 2, 2).value_or(0);
     const uint64_t count = probe_.Read(entry + 4, 4).value_or(0);

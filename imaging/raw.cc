@@ -40,7 +40,7 @@ Status CheckDecoded(const std::filesystem::path& path, LibRaw& raw, int open_or_
               LibRaw::version());
 }
 
-// Before room is made for the samples.
+// Checks the size before room is made for the samples.
 Status CheckFits(const std::filesystem::path& path, const libraw_image_sizes_t& sizes,
                  uint64_t file_bytes) {
   const uint64_t bytes = uint64_t{sizes.raw_width} * sizes.raw_height * sizeof(uint16_t);
@@ -161,7 +161,7 @@ Result<RawReadings> ReadingsOf(const std::filesystem::path& path, LibRaw& raw) {
   return readings;
 }
 
-// The visible area as a fraction of the way from black to white.
+// Returns the visible area as a fraction of the way from black to white.
 RawMosaic FractionsOf(const RawReadings& readings) {
   RawMosaic mosaic{
       .samples = Image<float>(readings.size_px), .cfa = readings.cfa, .white = readings.white};

@@ -17,7 +17,7 @@ constexpr int kAlbedoCells = 32;
 // Kept back of the room, so that errors of the tables (measured: up to 0.0024) create no light.
 constexpr double kTableError = 0.003;
 
-// R of a reciprocal isotropic model, in its first colour, at a view of this cosine.
+// Returns R of a reciprocal isotropic model, in its first colour, at a view of this cosine.
 double AlbedoAt(const Brdf& brdf, double n_v, int side) {
   const Eigen::Vector3d v(std::sqrt(1.0 - n_v * n_v), 0.0, n_v);
   return DirectionalAlbedo(brdf, Eigen::Vector3d::UnitZ(), v, side)[0];

@@ -14,7 +14,8 @@ namespace {
 constexpr double kLeastCosine = 1e-4;
 constexpr double kLeastAlpha = 1e-3;
 
-// Like AnglesBetween(), but n.v and n.h stay away from where the models divide by them.
+// Returns the same as AnglesBetween(), but n.v and n.h stay away from where the models divide by
+// them.
 IsotropicAngles SafeAngles(const Eigen::Vector3d& n, const Eigen::Vector3d& l,
                            const Eigen::Vector3d& v) {
   IsotropicAngles at = AnglesBetween(n, l, v);

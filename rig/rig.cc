@@ -21,7 +21,7 @@ using Json = nlohmann::json;
 // what was written changes no bit.
 constexpr double kRounding = 1e-14;
 
-// The rotation nearest to one that a file has rounded.
+// Returns the rotation nearest to one that a file has rounded.
 Eigen::Matrix3d NearestRotation(const Eigen::Matrix3d& r) {
   if ((r.transpose() * r - Eigen::Matrix3d::Identity()).lpNorm<Eigen::Infinity>() <= kRounding) {
     return r;

@@ -29,7 +29,7 @@ std::vector<float> PointSpread(double sigma_px) {
   return result;
 }
 
-// `source` convolved along x, or along y, into `target`.
+// Writes `source` convolved along x, or along y, into `target`.
 Status Convolve(const std::vector<float>& half, bool along_x, const Image<float>& source,
                 Image<float>& target, const Task& task) {
   const int reach = static_cast<int>(half.size()) - 1;

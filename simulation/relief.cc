@@ -34,7 +34,7 @@ Eigen::Vector3d Tilted(const Eigen::Vector2d& towards, double slope_rad) {
   return {side.x(), side.y(), std::cos(slope_rad)};
 }
 
-// u, v in [-1, 1] across the shorter side of the image, v up.
+// Returns the normal at u, v in [-1, 1] across the shorter side of the image, v up.
 Eigen::Vector3d NormalAt(const ReliefScene& scene, double u, double v, double period) {
   switch (scene.shape) {
     case ReliefShape::kFlat:
@@ -69,7 +69,7 @@ class RowRenderer {
         half_(0.5 * std::min(size.width, size.height)),
         out_(out) {}
 
-  // False where a pixel does not see the table.
+  // Returns false if a pixel does not see the table.
   [[nodiscard]] bool Render(int row) const {
     for (int column = 0; column < size_.width; ++column) {
       std::optional<Eigen::Vector3d> x_mm = Eigen::Vector3d::Zero();

@@ -35,7 +35,7 @@ void SetVector(Image3& image, size_t pixel, const Eigen::Vector3d& value) {
   }
 }
 
-// Albedo of the body at a surface point, with its yarn's share of the variation.
+// Returns the albedo of the body at a surface point, with its yarn's share of the variation.
 Eigen::Vector3d BodyAlbedo(const Scene& scene, const SurfacePoint& point, double x_mm,
                            double y_mm) {
   const Material& material = scene.materials[static_cast<size_t>(point.part)];
@@ -59,7 +59,7 @@ std::optional<Eigen::Vector3d> SurfacePointOfPixel(const Scene& scene, double u,
   return t ? std::optional<Eigen::Vector3d>(ray.At(*t)) : std::nullopt;
 }
 
-// False where the pixel does not see the surface.
+// Returns false if the pixel does not see the surface.
 bool MapPixel(const Scene& scene, int x, int y, const Eigen::Vector2d& shift_px,
               SurfaceMaps& maps) {
   const size_t pixel = maps.part.Index(x, y);
@@ -166,7 +166,7 @@ class PixelShader {
     return scene_.illumination.shadows == Shadows::kNone ? cosine : std::max(0.0, cosine);
   }
 
-  // pi f_r
+  // Returns pi f_r.
   [[nodiscard]] Eigen::Vector3d Reflected(size_t pixel, const Eigen::Vector3d& n,
                                           const Eigen::Vector3d& l, const Eigen::Vector3d& x_mm,
                                           const Eigen::Vector3d& rho) const {
@@ -184,7 +184,8 @@ class PixelShader {
     return IsVisible(*scene_.surface, x_mm, l, distance_mm);
   }
 
-  // Over the places of a pixel's footprint on the surface, taken for level, that see the light.
+  // Returns the share of the places of a pixel's footprint on the surface that see the light; the
+  // footprint is taken to be level.
   [[nodiscard]] double VisibleShare(size_t pixel, const Eigen::Vector3d& x_mm) const {
     const auto width = static_cast<size_t>(maps_.part.width);
     const size_t column = pixel % width;
@@ -204,7 +205,7 @@ class PixelShader {
     return static_cast<double>(visible) / (count * count);
   }
 
-  // (2), as irradiance.
+  // Returns (2), as irradiance.
   [[nodiscard]] Eigen::Vector3d Bounced(size_t pixel, const Eigen::Vector3d& x_mm,
                                         const Eigen::Vector3d& n) const {
     const int rays = scene_.illumination.bounce_rays;
@@ -228,7 +229,7 @@ class PixelShader {
     return sum / (side * side);
   }
 
-  // The light that the Lambertian body at the end of a ray sends back.
+  // Returns the light that the Lambertian body at the end of a ray sends back.
   [[nodiscard]] Eigen::Vector3d DirectFrom(const Ray& ray) const {
     const std::optional<double> t = NextHit(*scene_.surface, ray, kFarAway_mm, kBounceStep);
     if (!t) {
@@ -253,7 +254,7 @@ class PixelShader {
   std::optional<Light> light_;
 };
 
-// The light from which on the camera stands elsewhere; past the last if it never does.
+// Returns the light from which on the camera stands elsewhere; past the last if it never does.
 size_t BumpIndex(const Scene& scene) {
   const auto found = std::ranges::find(scene.rig.lights, scene.lens.bump_from, &Light::name);
   return static_cast<size_t>(found - scene.rig.lights.begin());

@@ -23,7 +23,8 @@ Gap GapAt(const Surface& surface, const Ray& ray, double t) {
   return {at.z() - point.height_mm, ray.direction.z() - point.slope.dot(ray.direction.head<2>())};
 }
 
-// The fastest at which the gap can close; negative where the ray rises faster than any slope.
+// Returns the fastest rate at which the gap can close; negative if the ray rises faster than any
+// slope.
 double ClosingRate(const Surface& surface, const Ray& ray) {
   return surface.MaxSlope() * ray.direction.head<2>().norm() - ray.direction.z() + 1e-12;
 }

@@ -52,7 +52,7 @@ void Raise(SurfacePoint& seen, const SurfacePoint& candidate) {
 
 int Modulo(int i, int n) { return ((i % n) + n) % n; }
 
-// True where warp yarn i lies over weft yarn j.
+// Returns true if warp yarn i lies over weft yarn j.
 bool WarpIsOver(WeavePattern pattern, int i, int j) {
   switch (pattern) {
     case WeavePattern::kTwill:
@@ -66,7 +66,7 @@ bool WarpIsOver(WeavePattern pattern, int i, int j) {
   }
 }
 
-// How far a pattern goes until it repeats, in pitches.
+// Returns the length of a pattern's repeat, in pitches.
 int RepeatOf(WeavePattern pattern) {
   switch (pattern) {
     case WeavePattern::kSatin:

@@ -37,7 +37,7 @@ cairo_status_t Append(void* bytes, const unsigned char* data, unsigned int lengt
   return CAIRO_STATUS_SUCCESS;
 }
 
-// Centred on x, smaller where it would not fit `width_mm`; y is its base line.
+// Shows the text centred on x, smaller where it would not fit `width_mm`; y is its base line.
 void ShowText(cairo_t* cr, const std::string& text, double size_mm, double width_mm, double x,
               double y) {
   cairo_text_extents_t extents;
@@ -63,7 +63,7 @@ void DrawRuler(cairo_t* cr, const Page& page, double y) {
   cairo_stroke(cr);
 }
 
-// At each corner of a sheet, outside of it.
+// Draws marks at each corner of a sheet, outside of it.
 void DrawCutMarks(cairo_t* cr, const Page& page) {
   const Eigen::Vector2d half = 0.5 * page.print.SizeMm();
   for (const double x : {-1.0, 1.0}) {
@@ -91,7 +91,7 @@ std::string InstructionOf(const Page& page) {
                      black.sizes().x(), black.sizes().y());
 }
 
-// In millimetres, right and down from the paper's top left corner.
+// Draws in millimetres, right and down from the paper's top left corner.
 void Draw(cairo_t* cr, const Page& page) {
   cairo_set_source_rgb(cr, 1.0, 1.0, 1.0);
   cairo_paint(cr);

@@ -26,7 +26,7 @@ Eigen::Vector2d RoomMm(const Eigen::Vector2d& paper_mm, bool is_sheet) {
                                     paper_mm.y() - 2.0 * kPageMarginMm - kFooterMm);
 }
 
-// The paper, turned so that the print fits; as it is where that does.
+// Returns the paper, turned so that the print fits; as it is if the print fits without a turn.
 std::optional<Eigen::Vector2d> FittingPaper(const Eigen::Vector2d& paper_mm, const Print& print,
                                             bool is_sheet) {
   for (const Eigen::Vector2d& turned : {paper_mm, Eigen::Vector2d(paper_mm.y(), paper_mm.x())}) {
@@ -37,7 +37,7 @@ std::optional<Eigen::Vector2d> FittingPaper(const Eigen::Vector2d& paper_mm, con
   return std::nullopt;
 }
 
-// How large the print could be on the paper, as a share of its size.
+// Returns how large the print could be on the paper, as a share of its size.
 double LargestShare(const Eigen::Vector2d& paper_mm, const Print& print) {
   double largest = 0.0;
   for (const Eigen::Vector2d& turned : {paper_mm, Eigen::Vector2d(paper_mm.y(), paper_mm.x())}) {

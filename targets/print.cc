@@ -15,7 +15,7 @@ Eigen::AlignedBox2d BoxOf(double left, double top, double width, double height) 
   return {Eigen::Vector2d(left, top - height), Eigen::Vector2d(left + width, top)};
 }
 
-// The runs of black cells of the marker's rows.
+// Adds the runs of black cells of the marker's rows.
 void AddMarker(const std::string& dictionary, int id, const Eigen::Vector3d& center_mm,
                double side_mm, std::vector<Eigen::AlignedBox2d>& black_mm) {
   const Image<uint8_t> cells = MarkerCells(dictionary, id);

@@ -22,7 +22,7 @@ Rgb8 MakeRgb8(ImageSize size, uint8_t fill = 0) {
   return {Image<uint8_t>(size, fill), Image<uint8_t>(size, fill), Image<uint8_t>(size, fill)};
 }
 
-// Black, purple, red, yellow, white at equal steps.
+// Returns a colour from black, purple, red, yellow, white at equal steps.
 std::array<uint8_t, 3> HeatColor(float t) {
   constexpr std::array<std::array<float, 3>, 5> kStops = {{{0.0F, 0.0F, 0.0F},
                                                            {0.4F, 0.0F, 0.6F},
@@ -39,7 +39,7 @@ std::array<uint8_t, 3> HeatColor(float t) {
   return color;
 }
 
-// The mean of each factor x factor block.
+// Returns the mean of each factor x factor block.
 Image<uint8_t> Shrink(const Image<uint8_t>& image, int factor) {
   Image<uint8_t> small(std::max(1, image.width / factor), std::max(1, image.height / factor));
   for (int y = 0; y < small.height; ++y) {

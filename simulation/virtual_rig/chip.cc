@@ -26,7 +26,7 @@ size_t PortIndex(char port) {
 // libsimavr speaks of its own doings; what counts is told by Events.
 void Silent(avr_t* /*avr*/, int /*level*/, const char* /*format*/, va_list /*arguments*/) {}
 
-// 62.5 ns each; rounded up, so that Now() is not before a time that was run to.
+// Returns cycles of 62.5 ns each; rounded up, so that Now() is not before a time that was run to.
 uint64_t CyclesOf(SimTime time) { return (static_cast<uint64_t>(time.count()) * 2 + 124) / 125; }
 
 }  // namespace

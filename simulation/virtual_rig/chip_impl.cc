@@ -47,7 +47,7 @@ void Chip::Impl::OnReset(avr_t* avr) {
   }
 }
 
-// The first cycle after a reset, when all modules are reset.
+// Runs in the first cycle after a reset, when all modules are reset.
 avr_cycle_count_t Chip::Impl::OnStart(avr_t* avr, avr_cycle_count_t /*when*/, void* chip) {
   // Otherwise a low level at PD2 or PD3 is polled in every cycle, sleeping or not, which makes it
   // 300 times slower. Firmware that waits for an edge does not miss it.
@@ -224,7 +224,7 @@ double Chip::Impl::Duty(size_t timer, char unit) const {
   return connection == 2 ? std::min(share, 1.0) : 1 - std::min(share, 1.0);
 }
 
-// `end` is later than Cycle().
+// Runs to `end`, which is later than Cycle().
 void Chip::Impl::RunCpu(uint64_t end) {
   // A sleeping chip jumps from timer to timer; this one makes it stop at the end.
   avr_cycle_timer_register(avr, end - Cycle(), &OnStop, this);

@@ -42,8 +42,8 @@ int HexDigit(char c) {
   return upper >= 'A' && upper <= 'F' ? upper - 'A' + 10 : -1;
 }
 
-// The bytes of ":10010000214601360121470136007EFE09D2190140", or none where it is no such record
-// or its sum is wrong.
+// Returns the bytes of ":10010000214601360121470136007EFE09D2190140", or none if it is no such
+// record or its sum is wrong.
 std::vector<uint8_t> DecodeRecord(std::string_view line) {
   if (line.size() < 11 || line[0] != ':' || line.size() % 2 == 0) {
     return {};
@@ -62,8 +62,8 @@ std::vector<uint8_t> DecodeRecord(std::string_view line) {
   return sum == 0 && bytes.size() == size_t{bytes[0]} + 5 ? bytes : std::vector<uint8_t>();
 }
 
-// Intel HEX with 16-bit addresses, which reach all of 32 KiB. Type 0 is data, 1 the end; 3 and 5
-// name a start address, which an AVR does not have.
+// Reads Intel HEX with 16-bit addresses, which reach all of 32 KiB. Type 0 is data, 1 the end; 3
+// and 5 name a start address, which an AVR does not have.
 Result<std::vector<uint8_t>> ReadHex(std::string_view text, const std::string& path) {
   std::vector<uint8_t> flash;
   for (int number = 1; !text.empty(); ++number) {

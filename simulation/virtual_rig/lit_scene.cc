@@ -17,7 +17,7 @@ namespace fs = std::filesystem;
 
 constexpr const char* kHowToRender = "render it with sateen simulate SCENE --linear -o DIR";
 
-// (1) of one frame.
+// Reads (1) of one frame.
 Result<Image<float>> ReadSites(const FrameFile& file, const Sensor& sensor, ImageSize size_px) {
   if (const auto hash = CheckedHash(file); !hash) {
     return tl::unexpected(hash.error());
@@ -51,7 +51,7 @@ Result<Image<float>> ReadSites(const FrameFile& file, const Sensor& sensor, Imag
   return sites;
 }
 
-// The session's frames: one of each light, then the dark ones.
+// Returns the session's frames: one of each light, then the dark ones.
 Result<std::vector<FrameFile>> FramesOf(const fs::path& dir, const ReadPlan& plan) {
   if (!plan.rig.camera || plan.rig.lights.empty()) {
     return Fail(ErrorCode::kBadData, "{}: its rig has no {}; need a rig with both", dir.string(),

@@ -35,7 +35,7 @@ void Complain(const Error& error) {
   std::cerr << fmt::format("sateen-virtual-rig: error: {}\n", error.message);
 }
 
-// Beside this program, where the build and `make install` put what belongs to it.
+// Looks beside this program, where the build and `make install` put what belongs to it.
 fs::path FindBeside(const std::vector<std::string>& candidates) {
   std::error_code failed;
   const fs::path folder = fs::read_symlink("/proc/self/exe", failed).parent_path();
@@ -121,7 +121,7 @@ Result<int> RunCommand(const RigArgs& args, RigLoop& loop, RigCommands& commands
 // Commands from standard input, a line each, until it ends.
 class CommandReader {
  public:
-  // False once told to quit.
+  // Returns false once told to quit.
   bool Step(RigCommands& commands) {
     pollfd input = {.fd = 0, .events = POLLIN, .revents = 0};
     if (ended_ || poll(&input, 1, 0) != 1) {

@@ -7,8 +7,8 @@
 namespace sateen {
 namespace {
 
-// The z above 0 of which the normal distribution has the share `p` above, by Newton's method from a
-// z that is a little too small.
+// Returns the z above 0 beyond which the share `p` of the normal distribution lies, by Newton's
+// method from a z that is a little too small.
 double UpperQuantile(double p, double z) {
   for (int step = 0; step < 50; ++step) {
     const double above = 0.5 * std::erfc(z / std::numbers::sqrt2);

@@ -8,7 +8,7 @@
 namespace sateen {
 namespace {
 
-// "12ms" or "0.5s".
+// Reads "12ms" or "0.5s".
 Result<std::chrono::nanoseconds> TimeIn(const std::string& text) {
   const size_t unit = text.find_first_not_of("0123456789.");
   const std::string name = unit == std::string::npos ? "" : text.substr(unit);

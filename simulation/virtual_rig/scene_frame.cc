@@ -77,7 +77,7 @@ class ShiftedAxis {
   [[nodiscard]] float Fraction() const { return fraction_; }
 
  private:
-  // Within the picture and of the phase of i.
+  // Returns a place within the picture and of the phase of i.
   [[nodiscard]] int Clamped(int i, int at) const {
     const int phase = i % 2;
     const int last = count_ - 1 - (count_ - 1 - phase) % 2;

@@ -10,7 +10,7 @@ namespace {
 
 using std::chrono::seconds;
 
-// The same for every standard library, unlike std::uniform_real_distribution.
+// Returns the same for every standard library, unlike std::uniform_real_distribution.
 double Uniform(std::mt19937_64& random) { return static_cast<double>(random() >> 11) * 0x1.0p-53; }
 
 }  // namespace

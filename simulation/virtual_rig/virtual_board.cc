@@ -26,7 +26,7 @@ BoardWiring WiringOf14() {
           .shutter = SATEEN_PIN_OF(SATEEN_SHUTTER_PORT, SATEEN_SHUTTER_BIT)};
 }
 
-// Two more lights on the pins of flash sync and shutter.
+// Adds two more lights on the pins of flash sync and shutter.
 BoardWiring WiringOf16() {
   BoardWiring wiring = WiringOf14();
   wiring.lights = {SATEEN_LIGHT_PINS_16(SATEEN_LIGHT_PIN)};

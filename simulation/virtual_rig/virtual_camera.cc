@@ -281,7 +281,7 @@ FrameRequest VirtualCamera::NextFrame(CameraFault fault) {
   return request;
 }
 
-// On a thread of its own.
+// Runs on a thread of its own.
 void VirtualCamera::Expose(FrameRequest request, CameraFault fault, uint32_t transaction) {
   if (!Wait(request.end)) {
     return;
