@@ -175,6 +175,16 @@ TEST(ShiftBetween, TellsNothingWithoutTexture) {
   EXPECT_EQ(ShiftBetween(flat, Image<float>(80, 58)).peak, 0.0);
 }
 
+// A cell is 2 px: the parabola finds fractions of it.
+TEST(ShiftBetween, FindsFractionsOfACell) {
+  for (const Eigen::Vector2d& px : {Eigen::Vector2d(2.6, -1.4), Eigen::Vector2d(-3.4, 0.6)}) {
+    const Cloth cloth(NudgedFrom(kFrames - 1, px));
+    const Correlation found = ShiftBetween(cloth.images.front(), cloth.images.back());
+    EXPECT_LT((found.px - px).norm(), 0.3) << found.px;
+    EXPECT_GT(found.peak, 0.5);
+  }
+}
+
 // A weave of 16 px per yarn with a fine print, nudged by 0.4 px between frames 5 and 6: what the
 // solve makes of it. Rendered at twice the size, because a pixel's one ray would not move with the
 // picture.
