@@ -26,7 +26,7 @@ struct Camera {
   std::array<double, 5> distortion = {};  // k1, k2, p1, p2, k3
   // Camera points (x right, y down, z forward) to table points, in millimetres.
   Eigen::Isometry3d table_from_camera = Eigen::Isometry3d::Identity();
-  // Whether table_from_camera is known; false between the calibrations of lens and pose.
+  // True if table_from_camera is known; false between the calibrations of lens and pose.
   bool has_pose = true;
 
   // Fails with the first field that is out of range, its value and its range.

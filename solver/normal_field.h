@@ -24,7 +24,7 @@ enum class Backend {
 // Returns nothing for a name that no backend has.
 [[nodiscard]] std::optional<Backend> BackendNamed(std::string_view name);
 
-// Whether a pixel is solved, and if not, why. The values are those of reason.png.
+// Reason why a pixel has no answer, or that it has one. The values are those of reason.png.
 enum class Reason : uint8_t {
   kOutsideMask = 0,
   kDark = 64,             // no light gives a reading above the dark level

@@ -11,7 +11,7 @@ namespace sateen {
 // Facts that hold for all maps of a solve, whichever way they are written.
 struct MapsFacts {
   NormalY normal_y = NormalY::kUp;
-  // Whether uncertainty.exr, albedo_uncertainty.exr and model.png are among the maps.
+  // True if uncertainty.exr, albedo_uncertainty.exr and model.png are among the maps.
   bool has_ladder = false;
   // Camera whose pixels the maps have; absent where the rig has none.
   std::optional<Camera> camera;

@@ -46,9 +46,9 @@ struct SolveOptions {
   NormalY normal_y = NormalY::kUp;
   // Height of the surface above the table plane; at most a quarter of the lowest light's.
   double height_mm = 0.0;
-  // Whether each pixel's height is found from the normals, and the solve repeated with it.
+  // Finds each pixel's height from the normals, and repeats the solve with it.
   bool relief = false;
-  // Whether the maps are those of a camera without the lens's distortion.
+  // Writes the maps as a camera without the lens's distortion would see them.
   bool undistort = false;
   // Largest mean angular error from truth that passes, in (0, 180]; the capture must have truth.
   std::optional<double> fail_above_deg;

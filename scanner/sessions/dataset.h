@@ -55,7 +55,7 @@ struct ReadDatasetOptions {
   std::optional<std::filesystem::path> mask_file = std::nullopt;
   // A simulated session whose truth is this dataset's too, in place of what lies beside it.
   std::optional<std::filesystem::path> truth_dir = std::nullopt;
-  // Whether to take all photographs of a folder that is no session, one per light. The lights'
+  // Takes all photographs of a folder that is no session, one per light. The lights'
   // directions are not known yet (docs/calibration.md, Chrome spheres).
   bool lights_unknown = false;
   Encoding encoding = Encoding::kAuto;

@@ -104,7 +104,7 @@ TEST(RegisterFrames, FindsOneFrameThatMovedAndCameBack) {
   EXPECT_LT(WorstError(cloth.Register(cloth.rig), truth), 0.05);
 }
 
-// Standard deviations are those of many sessions: noise alone, at 5 % of the brightness. The
+// Holds what the code does today; 1 would be right for both. Noise alone, at 5 % of the brightness. The
 // repeat, to which gloss adds nothing, shows that (2) alone knows 0.6 of them; with what gloss
 // adds, the other frames' are 1.1 of them. 40 seeds of two axes know the ratio of one frame to 8 %,
 // that of nine to 3 %.

@@ -63,7 +63,7 @@ class LitCamera : public TetheredCamera {
   std::function<void(int capture)> on_exposed;  // middle of an exposure; captures from 0
   std::vector<size_t> image_of_channel;         // another wiring; empty: as the rig has it
   std::vector<double> times_s;                  // times that it says it has
-  // Whether the picture gets brighter with the exposure time; the images are for 20 ms.
+  // True if the picture gets brighter with the exposure time; the images are for 20 ms.
   bool exposure_counts = false;
   bool needs_a_person = false;  // its answer after a failure
   int captures = 0;
