@@ -104,9 +104,9 @@ TEST(RegisterFrames, FindsOneFrameThatMovedAndCameBack) {
   EXPECT_LT(WorstError(cloth.Register(cloth.rig), truth), 0.05);
 }
 
-// Holds what the code does today; 1 would be right for both. Noise alone, at 5 % of the brightness. The
-// repeat, to which gloss adds nothing, shows that (2) alone knows 0.6 of them; with what gloss
-// adds, the other frames' are 1.1 of them. 40 seeds of two axes know the ratio of one frame to 8 %,
+// Holds the figures of today's code; 1 would be right for both. Noise alone, at 5 % of the
+// brightness. Gloss adds nothing to the repeat, so that it shows (2) alone: 0.6. With the part that
+// gloss adds, the other frames are at 1.1. 40 seeds of two axes know the ratio of one frame to 8 %,
 // that of nine to 3 %.
 TEST(RegisterFrames, KnowsHowSureItIs) {
   const std::vector<Eigen::Vector2d> truth = NudgedFrom(5, {0.4, 0.0});
