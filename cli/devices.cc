@@ -20,7 +20,7 @@ void AskPort(DeviceReply& device, std::unique_ptr<BytePort> port) {
     device.what = connected.error().message;
     return;
   }
-  TakeBoard(device, board.Info());
+  TakeBoard(device, board.Info(), board.Report());
 }
 
 // Connects to a camera as a capture does.

@@ -9,16 +9,6 @@
 namespace sateen::cli {
 namespace {
 
-std::vector<int> LitChannels(unsigned lit) {
-  std::vector<int> channels;
-  for (int channel = 0; lit >> channel != 0; ++channel) {
-    if ((lit >> channel & 1u) != 0) {
-      channels.push_back(channel);
-    }
-  }
-  return channels;
-}
-
 // "3 at 50 %, on for 120 ms, off in 380 ms", or "none".
 std::string LitText(const BoardState& state) {
   std::string text;

@@ -227,19 +227,23 @@ Result<CaptureSummary> CaptureSession::Run(LightBoard& board, TetheredCamera& ca
   return summary;
 }
 
+Error CaptureSession::Cancelled(FrameTaker& taker) const {
+  const Status dark = taker.TurnOff();
+  return {
+      dark ? ErrorCode::kCancelled : dark.error().code,
+      fmt::format("cancelled; {}, and what was captured is kept; to continue: sateen capture "
+                  "--resume {}",
+                  dark ? "the lights are off" : dark.error().message, store_.Folder().string())};
+}
+
 Result<CaptureSummary> CaptureSession::TakeAndCheck(FrameTaker& taker) {
   if (const Status verified = store_.VerifyDone(); !verified) {
     return tl::unexpected(verified.error());
   }
   for (int round = 1;; ++round) {
     if (const Status taken = TakeAll(taker); !taken) {
-      return tl::unexpected(
-          taken.error().code == ErrorCode::kCancelled
-              ? Error{ErrorCode::kCancelled,
-                      fmt::format("cancelled; the lights are off, and what was captured is kept; "
-                                  "to continue: sateen capture --resume {}",
-                                  store_.Folder().string())}
-              : taken.error());
+      return tl::unexpected(taken.error().code == ErrorCode::kCancelled ? Cancelled(taker)
+                                                                        : taken.error());
     }
     progress_.Tell(store_, "checking");
     Result<CaptureCheck> check = CheckAll();

@@ -89,6 +89,8 @@ class CaptureSession {
  private:
   CaptureSession(SessionStore store, const CaptureOptions& options);
 
+  // Returns the error of a cancelled capture, once the board was asked whether all lights are off.
+  [[nodiscard]] Error Cancelled(FrameTaker& taker) const;
   [[nodiscard]] Result<CaptureSummary> TakeAndCheck(FrameTaker& taker);
   [[nodiscard]] Status MakePlan(FrameTaker& taker);
   [[nodiscard]] Result<std::vector<double>> Meter(std::size_t light, FrameTaker& taker);

@@ -60,6 +60,8 @@ Result<TakenFrame> FrameTaker::Take(const std::optional<Light>& light, double ex
       });
 }
 
+Status FrameTaker::TurnOff() { return ConfirmDark(board_); }
+
 Status FrameTaker::Recover(const Error& error) {
   if (error.code != ErrorCode::kDevice && error.code != ErrorCode::kTimeout) {
     return {};

@@ -57,6 +57,9 @@ class FrameTaker {
   // both errors.
   [[nodiscard]] Status Recover(const Error& error);
 
+  // Turns all lights off. Fails unless the board says that they are.
+  [[nodiscard]] Status TurnOff();
+
   // Returns whether the latest failure needs a person, as a full memory card does.
   [[nodiscard]] bool NeedsAPerson() const { return camera_.NeedsAPerson(); }
 

@@ -13,22 +13,6 @@ namespace {
 
 using std::chrono::milliseconds;
 
-// Turns everything off when it goes out of scope.
-class LightsOff {
- public:
-  explicit LightsOff(LightBoard& board) : board_(board) {}
-  LightsOff(const LightsOff&) = delete;
-  LightsOff& operator=(const LightsOff&) = delete;
-  ~LightsOff() {
-    if (board_.state() == LightBoard::State::kReady) {
-      [[maybe_unused]] const Result<BoardState> ignored = board_.AllOff();
-    }
-  }
-
- private:
-  LightBoard& board_;
-};
-
 // Talks to the board while the camera exposes, so that it keeps the light on, and turns the light
 // off at once if the capture is cancelled. Nobody else uses the board until Stop().
 class KeepAlive {
@@ -68,6 +52,7 @@ class KeepAlive {
     while (!stop_.wait_for(lock, kStep, [&] { return stopped_; })) {
       silent += kStep;
       if (task_.Cancelled()) {
+        // What it says to that is asked again when the camera has ended.
         [[maybe_unused]] const Result<BoardState> ignored = board_.AllOff();
         return;
       }
@@ -125,18 +110,33 @@ Status TurnOnAlone(LightBoard& board, const LitExposure& exposure, const Capture
                : tl::unexpected(state.error());
 }
 
-// Steps 3 and 4.
-Status ConfirmAndTurnOff(LightBoard& board, const LitExposure& exposure) {
-  const Result<BoardReport> report = board.Report();
-  Status confirmed =
-      report ? ConfirmLit(exposure.light, report->state, "until the camera had delivered")
-             : tl::unexpected(report.error());
-  if (!confirmed) {
-    return confirmed;
+// Steps 1 to 3.
+Result<LitFrame> ExposeUnder(LightBoard& board, TetheredCamera& camera, const LitExposure& exposure,
+                             const CaptureOptions& options, const std::filesystem::path& folder,
+                             const Task& task) {
+  if (const Status lit = TurnOnAlone(board, exposure, options); !lit) {
+    return tl::unexpected(lit.error());
   }
-  const Result<BoardState> dark = board.AllOff();
-  return dark ? ConfirmLit(std::nullopt, *dark, "after the exposure")
-              : tl::unexpected(dark.error());
+  board.Wait(options.settle);
+  KeepAlive keep_alive(board, options.keep_alive, task);
+  const milliseconds shutter(static_cast<int>(std::ceil(1000.0 * exposure.exposure_s)));
+  const Stopwatch stopwatch;
+  Result<CapturedFile> file = camera.Capture(folder, shutter + options.deadline);
+  const double camera_s = stopwatch.Seconds();
+  const Status kept = keep_alive.Stop();
+  if (task.Cancelled()) {
+    return Fail(ErrorCode::kCancelled, "cancelled while the camera exposed");
+  }
+  if (!file) {
+    return tl::unexpected(file.error());
+  }
+  const Result<BoardReport> report = kept.and_then([&] { return board.Report(); });
+  if (!report) {
+    return tl::unexpected(report.error());
+  }
+  return ConfirmLit(exposure.light, report->state, "until the camera had delivered").map([&] {
+    return LitFrame{*std::move(file), camera_s};
+  });
 }
 
 }  // namespace
@@ -152,25 +152,22 @@ Result<LitFrame> ExposeLit(LightBoard& board, TetheredCamera& camera, const LitE
       return tl::unexpected(connected.error());
     }
   }
-  const LightsOff off(board);
-  if (const Status lit = TurnOnAlone(board, exposure, options); !lit) {
-    return tl::unexpected(lit.error());
+  Result<LitFrame> frame = ExposeUnder(board, camera, exposure, options, folder, task);
+  const Status dark = ConfirmDark(board);
+  if (dark) {
+    return frame;
   }
-  board.Wait(options.settle);
-  KeepAlive keep_alive(board, options.keep_alive, task);
-  const milliseconds shutter(static_cast<int>(std::ceil(1000.0 * exposure.exposure_s)));
-  const Stopwatch stopwatch;
-  Result<CapturedFile> file = camera.Capture(folder, shutter + options.deadline);
-  const double camera_s = stopwatch.Seconds();
-  const Status kept = keep_alive.Stop();
-  if (task.Cancelled()) {
-    return Fail(ErrorCode::kCancelled, "cancelled while the camera exposed; the lights are off");
+  return frame ? Result<LitFrame>(tl::unexpected(dark.error()))
+               : Fail(frame.error().code == ErrorCode::kCancelled ? dark.error().code
+                                                                  : frame.error().code,
+                      "{}; and then: {}", frame.error().message, dark.error().message);
+}
+
+Status ConfirmDark(LightBoard& board) {
+  if (board.state() == LightBoard::State::kClosed) {
+    return {};
   }
-  if (!file) {
-    return tl::unexpected(file.error());
-  }
-  const Status confirmed = kept.and_then([&] { return ConfirmAndTurnOff(board, exposure); });
-  return confirmed.map([&] { return LitFrame{*std::move(file), camera_s}; });
+  return board.AllOff().map([](const BoardState&) {});
 }
 
 double LongestExposure(const BoardInfo& board, const Light& light, const CaptureOptions& options) {

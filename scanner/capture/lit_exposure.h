@@ -35,12 +35,17 @@ struct LitFrame {
 ///     4. All lights go off, and the board confirms it.
 ///
 /// Connects the board where it is not. In every case all lights have been told to go off at the
-/// end; a cancelled task turns them off at once.
+/// end, and what the board says to that is in the error; a cancelled task turns them off at once.
 ///
-/// Errors   kDevice, kTimeout: board or camera; kIo: the disk; kCancelled
+/// Errors   kDevice, kTimeout: board or camera; kIo: the disk; kCancelled: the board has confirmed
+///          that all is off
 [[nodiscard]] Result<LitFrame> ExposeLit(LightBoard& board, TetheredCamera& camera,
                                          const LitExposure& exposure, const CaptureOptions& options,
                                          const std::filesystem::path& folder, const Task& task);
+
+// Turns all lights off. Fails unless the board says that they are; one that was never connected
+// has no light on for this program.
+[[nodiscard]] Status ConfirmDark(LightBoard& board);
 
 // Returns the longest exposure for which the board lets a light be on, margin included. [s]
 [[nodiscard]] double LongestExposure(const BoardInfo& board, const Light& light,

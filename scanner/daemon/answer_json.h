@@ -52,6 +52,11 @@ namespace sateen {
 [[nodiscard]] std::string LightOnJson(const LightOn& on);
 [[nodiscard]] Result<LightOn> LightOnFromJson(const std::string& text);
 
+// Writes {"lit": [...]}: the lights that the board says are on.
+[[nodiscard]] std::string LitJson(const BoardState& state);
+// Fails unless the daemon's answer is that no light is on.
+[[nodiscard]] Status NoneLitFromJson(const std::string& text);
+
 [[nodiscard]] std::string BoardJson(const BoardWord& board);
 [[nodiscard]] Result<BoardWord> BoardFromJson(const std::string& text);
 

@@ -5,8 +5,14 @@ namespace {
 
 using std::chrono::milliseconds;
 
+bool ChangesLimits(const BoardChange& change) { return change.max_level || change.max_on; }
+
+bool ChangesBoard(const BoardChange& change) {
+  return ChangesLimits(change) || change.max_lit || change.dim_clock || change.sync_rising;
+}
+
 Status ChangeLimits(const BoardChange& change, LightBoard& board) {
-  if (!change.max_level && !change.max_on) {
+  if (!ChangesLimits(change)) {
     return {};
   }
   const int first = change.channel.value_or(0);
@@ -60,6 +66,12 @@ Result<BoardWord> ChangeBoard(const BoardChange& change, LightBoard& board) {
   const Result<BoardReport> report = board.Report();
   if (!report) {
     return tl::unexpected(report.error());
+  }
+  if (ChangesBoard(change) && report->state.lit != 0) {
+    return Fail(ErrorCode::kDevice,
+                "{}: setting limits turns everything off, but the board says: {} on; look at the "
+                "lights, and cut their supply if one is on",
+                board.PortName(), LightsText(report->state.lit));
   }
   return BoardWord{.port = board.PortName(), .info = board.Info(), .report = *report};
 }

@@ -37,6 +37,21 @@ BoardState ReadState(JsonReader& json) {
 
 }  // namespace
 
+std::string LitJson(const BoardState& state) {
+  return ordered_json({{"lit", LitChannels(state.lit)}}).dump();
+}
+
+Status NoneLitFromJson(const std::string& text) {
+  const nlohmann::json json = nlohmann::json::parse(text, nullptr, /*allow_exceptions=*/false);
+  if (json.is_object() && json.value("lit", nlohmann::json()) == nlohmann::json::array()) {
+    return {};
+  }
+  return Fail(
+      ErrorCode::kDevice,
+      "the daemon does not say that all lights are off; a job still runs, or a light is on: "
+      "look at the lights, and at 'sateen light status'");
+}
+
 std::string BoardJson(const BoardWord& board) {
   const BoardInfo& info = board.info;
   const BoardReport& report = board.report;

@@ -69,7 +69,15 @@ DeviceReply ReplyOf(const UsbCamera& camera) {
           .what = camera.obstacle};
 }
 
-void TakeBoard(DeviceReply& reply, const BoardInfo& info) {
+void TakeBoard(DeviceReply& reply, const BoardInfo& info, const Result<BoardReport>& report) {
+  if (!report || report->state.lit != 0) {
+    reply.what = report ? fmt::format(
+                              "after 'hello', which turns everything off, it says: {} on; "
+                              "look at the lights, and cut their supply if one is on",
+                              LightsText(report->state.lit))
+                        : report.error().message;
+    return;
+  }
   reply.answers = true;
   reply.firmware = info.build_id;
   reply.protocol = info.protocol;

@@ -31,7 +31,9 @@ struct DeviceReply {
 
 [[nodiscard]] DeviceReply ReplyOf(const SerialPortInfo& port);
 [[nodiscard]] DeviceReply ReplyOf(const UsbCamera& camera);
-void TakeBoard(DeviceReply& reply, const BoardInfo& info);
+// Takes the board's greeting, and what it reported after it: with a light on, it is none that does
+// as it is told.
+void TakeBoard(DeviceReply& reply, const BoardInfo& info, const Result<BoardReport>& report);
 void TakeCamera(DeviceReply& reply, const CameraInfo& info);
 
 // Writes the object of `sateen devices --json` (docs/formats.md), and reads it back. An indent

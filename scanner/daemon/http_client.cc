@@ -268,8 +268,7 @@ Result<BoardWord> ChangeBoardByDaemon(const DaemonClient& daemon, const BoardCha
 }
 
 Status LightsOffByDaemon(const DaemonClient& daemon) {
-  const Result<std::string> off = daemon.Ask("POST", "/v1/lights/off");
-  return off ? Status{} : tl::unexpected(off.error());
+  return daemon.Ask("POST", "/v1/lights/off").and_then(NoneLitFromJson);
 }
 
 Result<std::vector<DeviceReply>> DevicesByDaemon(const DaemonClient& daemon) {

@@ -13,30 +13,35 @@ constexpr milliseconds kCancelStep{50};
 // Record of a light until it went off, by itself or because the task was cancelled.
 struct Lit {
   bool cancelled = false;
-  milliseconds lasted{0};  // as the board last said
+  milliseconds lasted{0};  // by this program's clock
   int fault = 0;
 };
 
 Result<Lit> StayUntilOff(LightBoard& board, int channel, const Task& task) {
   Lit lit;
+  const BytePort::Duration began = board.Now();
   while (true) {
     for (milliseconds waited{0}; waited < kKeepAlive && !task.Cancelled(); waited += kCancelStep) {
       board.Wait(kCancelStep);
     }
+    lit.lasted = std::chrono::ceil<milliseconds>(board.Now() - began);
     if (task.Cancelled()) {
       lit.cancelled = true;
-      const Result<BoardState> off = board.AllOff();
-      return off ? Result<Lit>(lit) : tl::unexpected(off.error());
+      return board.AllOff().map([&](const BoardState&) { return lit; });
     }
     const Result<BoardReport> report = board.Report();
     if (!report) {
       return tl::unexpected(report.error());
     }
-    lit.fault = report->state.fault;
-    if ((report->state.lit >> channel & 1u) == 0) {
+    const BoardState& state = report->state;
+    lit.fault = state.fault;
+    if (state.lit == 0) {
       return lit;
     }
-    lit.lasted = report->state.lit_for;
+    if (state.lit != 1U << static_cast<unsigned>(channel)) {
+      return Fail(ErrorCode::kDevice, "{}: light {} should be on alone, but the board says: {}",
+                  board.PortName(), channel, LightsText(state.lit));
+    }
   }
 }
 
@@ -79,6 +84,11 @@ Result<bool> KeepLightOn(const LightRequest& request, LightBoard& board, const T
         "light {} went off after {}, the longest that it may be on; if the LED bears more on its "
         "heat sink, raise that by 'sateen light limits {} --max-on TIME'",
         name, OnTimeText(on_time), name);
+  }
+  if (!lit->cancelled && lit->lasted + kKeepAlive < on_time) {
+    return Fail(ErrorCode::kDevice,
+                "light {} went off after {} at most, by itself; it was to be on for {}", name,
+                OnTimeText(lit->lasted), OnTimeText(on_time));
   }
   return lit->cancelled;
 }

@@ -30,8 +30,9 @@ struct LightOn {
 /// goes off or the task is cancelled; then the light is off. `began` is called once it is on.
 /// It is not called for level 0.
 ///
-/// Errors   kDevice: a fault of the board; the light's limit came before anybody cancelled, where
-///          no time was asked for; kInvalidArgument, kTimeout as LightBoard
+/// Errors   kDevice: a fault of the board; another light is on; the light went off long before its
+///          time; the light's limit came before anybody cancelled, where no time was asked for;
+///          kInvalidArgument, kTimeout as LightBoard
 /// Returns  whether it was cancelled
 [[nodiscard]] Result<bool> KeepLightOn(const LightRequest& request, LightBoard& board,
                                        const Task& task,

@@ -48,8 +48,7 @@ Result<std::string> DoLightsOff(JobContext& job) {
   if (!board) {
     return tl::unexpected(board.error());
   }
-  const Result<BoardState> off = (*board)->AllOff();
-  return off ? Result<std::string>(R"({"lit":[]})") : tl::unexpected(off.error());
+  return (*board)->AllOff().map(LitJson);
 }
 
 // Returns the device at this port; a new one at the end if the system does not show it.
@@ -76,7 +75,7 @@ void AskBoard(std::vector<DeviceReply>& devices, RigDevices& rig) {
   if (board) {
     const DeviceReply named = {.port = (*board)->PortName(),
                                .description = "the port of the daemon"};
-    TakeBoard(PlaceOf(devices, named), (*board)->Info());
+    TakeBoard(PlaceOf(devices, named), (*board)->Info(), (*board)->Report());
   }
 }
 

@@ -187,10 +187,14 @@ void RigService::RunJobs(Lane& lane) {
     }
     Result<std::string> result = Work(*job);
     const bool has_rig = job->record.has_rig;
-    std::string fault = has_rig ? ConfirmLightsOff() : std::string();
+    LightsWord lights = has_rig ? ConfirmLightsOff() : LightsWord();
+    if (lights.contradicts) {
+      result = Fail(ErrorCode::kDevice, "{}{}",
+                    result ? "" : result.error().message + "; and then: ", lights.fault);
+    }
     const std::lock_guard lock(mutex_);
     if (has_rig) {
-      NoteRig(std::move(fault));
+      NoteRig(std::move(lights));
     }
     End(*job, std::move(result));
   }
@@ -207,19 +211,19 @@ Result<std::string> RigService::Work(Job& job) {
   }
 }
 
-std::string RigService::ConfirmLightsOff() {
-  std::string fault;
+RigService::LightsWord RigService::ConfirmLightsOff() {
+  LightsWord lights;
   for (int tries = 0; tries < 2; ++tries) {
     const Result<LightBoard*> board = devices_->Board();
     if (!board && !devices_->BoardHasAnswered()) {
       return {};  // nothing of this daemon's can be on
     }
     if (!board) {
-      fault = board.error().message;
+      lights = {.fault = board.error().message};
       continue;
     }
     const Result<BoardState> off = (*board)->AllOff();
-    if (off && off->lit == 0) {
+    if (off) {
       const BoardInfo& info = (*board)->Info();
       const std::lock_guard lock(mutex_);
       board_ = {.port = (*board)->PortName(),
@@ -228,16 +232,22 @@ std::string RigService::ConfirmLightsOff() {
                 .lights = static_cast<int>(info.lights.size())};
       return {};
     }
-    fault = off ? "the board says that a light is on" : off.error().message;
+    lights = {.fault = off.error().message,
+              .contradicts = (*board)->state() == LightBoard::State::kReady};
+    if (const std::optional<BoardState>& said = (*board)->LastSaid()) {
+      lights.lit = LitChannels(said->lit);
+    }
   }
-  return "the board did not confirm that all lights are off; it turns them off by itself when it "
-         "hears nothing for 2 s: " +
-         fault;
+  lights.fault =
+      "the board did not confirm that all lights are off; it turns them off by itself when it "
+      "hears nothing for 2 s: " +
+      lights.fault;
+  return lights;
 }
 
-void RigService::NoteRig(std::string lights_fault) {
-  lit_.clear();
-  lights_fault_ = std::move(lights_fault);
+void RigService::NoteRig(LightsWord lights) {
+  lit_ = std::move(lights.lit);
+  lights_fault_ = std::move(lights.fault);
   camera_ = devices_->OpenCamera();
   if (!lights_fault_.empty()) {
     board_.reset();

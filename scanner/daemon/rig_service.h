@@ -38,8 +38,9 @@ struct RigState {
   std::optional<CameraInfo> camera;
   std::optional<JobRecord> job;       // the one that has the rig
   std::optional<JobRecord> last_job;  // the latest with the rig that has ended
-  std::vector<int> lit;               // channels that may be on; none where no job runs
-  std::string lights_fault;           // why the board's word that all is off is missing; else empty
+  // Channels that may be on; where no job runs, those that the board says are on, which none is.
+  std::vector<int> lit;
+  std::string lights_fault;  // why the board's word that all is off is missing; else empty
 };
 
 struct FollowedEvents {
@@ -56,7 +57,8 @@ struct FollowedEvents {
 ///                reached twice, which takes longer than its 2 s of silence     -> idle
 ///
 /// A job counts as running until its lights are off, so that no light is ever on while the state
-/// says that no job runs. Begin while a job runs is refused at once: the error names who has the
+/// says that no job runs. Where the board answers, and does not say that all is off, the job has
+/// failed, whatever it did, and State() names the lights. Begin while a job runs is refused at once: the error names who has the
 /// rig and since when. There is no queue. All calls may come from any thread.
 ///
 /// A job that needs no devices, as a solve, runs in a thread of its own beside the job that has the
@@ -111,9 +113,14 @@ class RigService {
   [[nodiscard]] Lane& LaneOf(const JobRecord& job) { return job.has_rig ? rig_ : desk_; }
   void RunJobs(Lane& lane);
   [[nodiscard]] Result<std::string> Work(Job& job);
-  // Asks the board to confirm that all is off. Returns what is wrong if it cannot.
-  [[nodiscard]] std::string ConfirmLightsOff();
-  void NoteRig(std::string lights_fault);                     // with the mutex held
+  // The board's answer to all off.
+  struct LightsWord {
+    std::string fault;         // why it has not confirmed; empty: it has
+    bool contradicts = false;  // whether it answers, and says something else
+    std::vector<int> lit;      // channels that it says are on
+  };
+  [[nodiscard]] LightsWord ConfirmLightsOff();
+  void NoteRig(LightsWord lights);                            // with the mutex held
   void End(Job& job, Result<std::string> result);             // with the mutex held
   void ForgetOldJobs();                                       // with the mutex held
   void Append(Job& job, std::string type, std::string data);  // with the mutex held

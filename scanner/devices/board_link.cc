@@ -5,6 +5,8 @@
 #include <string_view>
 #include <utility>
 
+#include "scanner/devices/board_answer.h"
+
 namespace sateen {
 namespace {
 
@@ -16,15 +18,6 @@ constexpr milliseconds kOpenInterval{20};
 constexpr milliseconds kHelloInterval{100};
 // 65 bytes of EEPROM at 3.4 ms, and then some.
 constexpr milliseconds kSlowExtra{400};
-
-// Returns a name such as "SET_LIGHT" as people read it.
-std::string Words(std::string_view name) {
-  std::string words(name);
-  std::ranges::transform(words, words.begin(), [](unsigned char letter) {
-    return letter == '_' ? ' ' : static_cast<char>(std::tolower(letter));
-  });
-  return words;
-}
 
 std::string_view ResultText(std::uint8_t result) {
   switch (result) {
@@ -39,6 +32,14 @@ std::string_view ResultText(std::uint8_t result) {
 }
 
 }  // namespace
+
+std::string BoardLink::Words(std::string_view name) {
+  std::string words(name);
+  std::ranges::transform(words, words.begin(), [](unsigned char letter) {
+    return letter == '_' ? ' ' : static_cast<char>(std::tolower(letter));
+  });
+  return words;
+}
 
 BoardLink::BoardLink(std::unique_ptr<BytePort> port, const LightBoardOptions& options)
     : port_(std::move(port)), options_(options) {}
@@ -168,17 +169,24 @@ Status BoardLink::CheckReady(const char* name) const {
   return {};
 }
 
-Status BoardLink::CheckResult(const char* name, std::uint8_t result, int fault) {
-  if (result == SATEEN_RESULT_DONE) {
+Status BoardLink::CheckDone(const char* name, std::uint8_t message, const SateenState& answer) {
+  if (answer.request != message) {
+    return Fail(ErrorCode::kDevice,
+                "{}: told '{}', the board answers another command; is it Sateen's firmware? 'make "
+                "flash' uploads it",
+                port_->Name(), Words(name));
+  }
+  if (answer.result == SATEEN_RESULT_DONE) {
     return {};
   }
-  if (result == SATEEN_RESULT_NOT_GREETED) {
+  if (answer.result == SATEEN_RESULT_NOT_GREETED) {
     return Restarted(name);
   }
-  return Fail(
-      ErrorCode::kDevice, "{}: the board refused '{}': {}{}; nothing was changed", port_->Name(),
-      Words(name), ResultText(result),
-      fault == SATEEN_FAULT_NONE ? "" : fmt::format(" (fault {}: {})", fault, FaultText(fault)));
+  return Fail(ErrorCode::kDevice, "{}: the board refused '{}': {}{}; nothing was changed",
+              port_->Name(), Words(name), ResultText(answer.result),
+              answer.fault == SATEEN_FAULT_NONE
+                  ? ""
+                  : fmt::format(" (fault {}: {})", answer.fault, FaultText(answer.fault)));
 }
 
 tl::unexpected<Error> BoardLink::Restarted(const char* name) {
@@ -251,6 +259,11 @@ Result<SateenGreeting> BoardLink::Connect() {
                     "its firmware up to this program",
                     port_->Name(), greeting->protocol_major, greeting->protocol_minor,
                     SATEEN_PROTOCOL_MAJOR, SATEEN_PROTOCOL_MINOR);
+  }
+  if (greeting) {
+    if (const Status possible = CheckGreeting(*greeting, port_->Name()); !possible) {
+      greeting = tl::unexpected(possible.error());
+    }
   }
   if (!greeting) {
     Lose();

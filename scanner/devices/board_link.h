@@ -5,6 +5,7 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <string_view>
 
 #include "firmware/protocol/codec.h"
 #include "firmware/protocol/frame.h"
@@ -39,6 +40,9 @@ class BoardLink {
  public:
   BoardLink(std::unique_ptr<BytePort> port, const LightBoardOptions& options);
 
+  // Returns a name such as "SET_LIGHT" as people read it.
+  [[nodiscard]] static std::string Words(std::string_view name);
+
   [[nodiscard]] LightBoard::State state() const { return state_; }
   [[nodiscard]] BytePort& port() { return *port_; }
 
@@ -46,8 +50,8 @@ class BoardLink {
   [[nodiscard]] Result<SateenGreeting> Connect();
   void Close() noexcept;
 
-  // Sends the command until its answer comes; `Answer` is what the table says that it is answered
-  // by. `slow` waits as long as writing the EEPROM may take.
+  // Sends the command until its answer comes, whatever that says; `Answer` is what the table says
+  // that it is answered by. `slow` waits as long as writing the EEPROM may take.
   template <typename Answer, typename Request>
   [[nodiscard]] Result<Answer> Command(const Request& request, bool slow = false) {
     using Message = BoardMessage<Request>;
@@ -61,12 +65,11 @@ class BoardLink {
     }
     Answer answer;
     BoardMessage<Answer>::kUnpack(frame->payload.data(), &answer);
-    const Status accepted = CheckResult(Message::kName, answer.result, answer.fault);
-    if (!accepted) {
-      return tl::unexpected(accepted.error());
-    }
     return answer;
   }
+  // Fails unless the board says that it has done the command `message`, which is called `name`.
+  // After "not greeted" the state is kRestarted.
+  [[nodiscard]] Status CheckDone(const char* name, std::uint8_t message, const SateenState& answer);
 
  private:
   // A received frame that owns its payload.
@@ -95,7 +98,6 @@ class BoardLink {
                                        std::span<const std::uint8_t> payload, std::uint8_t answer,
                                        std::size_t size, bool slow);
   [[nodiscard]] Status CheckReady(const char* name) const;
-  [[nodiscard]] Status CheckResult(const char* name, std::uint8_t result, int fault);
   [[nodiscard]] Result<SateenGreeting> Greet(BytePort::Duration deadline);
   [[nodiscard]] tl::unexpected<Error> Restarted(const char* name);
   void Lose() noexcept;

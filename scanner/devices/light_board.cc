@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "scanner/devices/board_answer.h"
 #include "scanner/devices/board_link.h"
 
 namespace sateen {
@@ -25,9 +26,7 @@ std::string ResetText(unsigned causes) {
   return text.empty() ? "unknown: the bootloader does not say" : text;
 }
 
-// Returns the state from a SateenState, or from a SateenReport, which begins with the same fields.
-template <typename Answer>
-BoardState StateOf(const Answer& answer) {
+BoardState StateOf(const SateenState& answer) {
   return {.fault = answer.fault,
           .lit = answer.lit,
           .level = LevelOf(answer.level_permille),
@@ -37,11 +36,18 @@ BoardState StateOf(const Answer& answer) {
           .shutter = milliseconds(answer.shutter_ms)};
 }
 
-Result<BoardState> StateOf(const Result<SateenState>& answer) {
-  if (!answer) {
-    return tl::unexpected(answer.error());
-  }
-  return StateOf(*answer);
+// Returns the fields of a report that it shares with a state.
+SateenState SharedFields(const SateenState& answer) { return answer; }
+SateenState SharedFields(const SateenReport& answer) {
+  return {.request = answer.request,
+          .result = answer.result,
+          .fault = answer.fault,
+          .lit = answer.lit,
+          .level_permille = answer.level_permille,
+          .lit_ms = answer.lit_ms,
+          .left_ms = answer.left_ms,
+          .armed = answer.armed,
+          .shutter_ms = answer.shutter_ms};
 }
 
 BoardInfo InfoOf(const SateenGreeting& greeting) {
@@ -54,8 +60,7 @@ BoardInfo InfoOf(const SateenGreeting& greeting) {
       .silence = milliseconds(greeting.silence_ms),
       .reset_cause = ResetText(greeting.reset_cause),
       .fault = greeting.fault};
-  const int channels = std::min<int>(greeting.channels, SATEEN_MAX_CHANNELS);
-  for (int channel = 0; channel < channels; ++channel) {
+  for (int channel = 0; channel < greeting.channels; ++channel) {
     info.lights.push_back({.max_level = LevelOf(greeting.max_level_permille[channel]),
                            .max_on = milliseconds(greeting.max_on_ms[channel])});
   }
@@ -124,6 +129,29 @@ std::string FaultText(int fault) {
   }
 }
 
+std::vector<int> LitChannels(unsigned lit) {
+  std::vector<int> channels;
+  for (int channel = 0; lit >> channel != 0; ++channel) {
+    if ((lit >> channel & 1U) != 0) {
+      channels.push_back(channel);
+    }
+  }
+  return channels;
+}
+
+std::string LightsText(unsigned lit) {
+  const std::vector<int> channels = LitChannels(lit);
+  if (channels.empty()) {
+    return "no light";
+  }
+  std::string text = channels.size() == 1 ? "light " : "lights ";
+  for (std::size_t k = 0; k < channels.size(); ++k) {
+    text += k == 0 ? "" : k + 1 == channels.size() ? " and " : ", ";
+    text += std::to_string(channels[k]);
+  }
+  return text;
+}
+
 Status LightBoardOptions::Validate() const {
   if (answer_timeout < milliseconds(1)) {
     return Fail(ErrorCode::kInvalidArgument, "answer_timeout is {} ms; needs at least 1 ms",
@@ -151,6 +179,7 @@ LightBoard& LightBoard::operator=(LightBoard&& other) noexcept {
     options_status_ = std::move(other.options_status_);
     link_ = std::move(other.link_);
     info_ = std::move(other.info_);
+    last_said_ = other.last_said_;
   }
   return *this;
 }
@@ -165,6 +194,8 @@ std::string LightBoard::PortName() const { return link_ == nullptr ? "" : link_-
 
 const BoardInfo& LightBoard::Info() const { return info_; }
 
+const std::optional<BoardState>& LightBoard::LastSaid() const { return last_said_; }
+
 Status LightBoard::Connect() {
   if (!options_status_) {
     return options_status_;
@@ -174,6 +205,7 @@ Status LightBoard::Connect() {
     return tl::unexpected(greeting.error());
   }
   info_ = InfoOf(*greeting);
+  last_said_.reset();
   return {};
 }
 
@@ -183,7 +215,41 @@ void LightBoard::Close() noexcept {
   }
 }
 
+BytePort::Duration LightBoard::Now() const { return link_->port().Now(); }
+
 void LightBoard::Wait(milliseconds time) { link_->port().Wait(time); }
+
+template <typename Answer, typename Request>
+Result<Answer> LightBoard::Ask(const Request& request, bool slow) {
+  const BytePort::Duration sent = link_->port().Now();
+  Result<Answer> answer = link_->Command<Answer>(request, slow);
+  if (!answer) {
+    return answer;
+  }
+  const SateenState said = SharedFields(*answer);
+  last_said_ = StateOf(said);
+  using Message = BoardMessage<Request>;
+  if (const Status done = link_->CheckDone(Message::kName, Message::kId, said); !done) {
+    return tl::unexpected(done.error());
+  }
+  const std::string contradiction =
+      Contradiction(request, said, {.board = info_, .took = link_->port().Now() - sent});
+  if (!contradiction.empty()) {
+    return Fail(ErrorCode::kDevice,
+                "{}: told '{}', the board says that {}{}; look at the lights, cut their supply if "
+                "one is on, and see whether the board has Sateen's firmware",
+                PortName(), BoardLink::Words(Message::kName), contradiction,
+                said.fault == SATEEN_FAULT_NONE
+                    ? ""
+                    : fmt::format(" (fault {}: {})", said.fault, FaultText(said.fault)));
+  }
+  return answer;
+}
+
+template <typename Request>
+Result<BoardState> LightBoard::Do(const Request& request, bool slow) {
+  return Ask<SateenState>(request, slow).map([](const SateenState& said) { return StateOf(said); });
+}
 
 Result<BoardState> LightBoard::SetLight(int channel, double level, milliseconds on_time, bool add) {
   if (const Status valid = CheckLevel(level); !valid) {
@@ -195,23 +261,20 @@ Result<BoardState> LightBoard::SetLight(int channel, double level, milliseconds 
       return tl::unexpected(valid.error());
     }
   }
-  return StateOf(link_->Command<SateenState>(
-      SateenSetLight{.channel = static_cast<std::uint8_t>(channel),
-                     .level_permille = PermilleOf(level),
-                     .on_ms = static_cast<std::uint16_t>(on_time.count()),
-                     .add = static_cast<std::uint8_t>(add)}));
+  return Do(SateenSetLight{.channel = static_cast<std::uint8_t>(channel),
+                           .level_permille = PermilleOf(level),
+                           .on_ms = static_cast<std::uint16_t>(on_time.count()),
+                           .add = static_cast<std::uint8_t>(add)});
 }
 
-Result<BoardState> LightBoard::AllOff() {
-  return StateOf(link_->Command<SateenState>(SateenAllOff{}));
-}
+Result<BoardState> LightBoard::AllOff() { return Do(SateenAllOff{}); }
 
 Result<BoardReport> LightBoard::Report() {
-  const Result<SateenReport> report = link_->Command<SateenReport>(SateenStatus{});
+  const Result<SateenReport> report = Ask<SateenReport>(SateenStatus{});
   if (!report) {
     return tl::unexpected(report.error());
   }
-  return BoardReport{.state = StateOf(*report),
+  return BoardReport{.state = StateOf(SharedFields(*report)),
                      .reset_cause = ResetText(report->reset_cause),
                      .uptime = milliseconds(report->uptime_ms),
                      .frames = report->frames,
@@ -237,10 +300,9 @@ Result<BoardState> LightBoard::Arm(int channel, double level, milliseconds on_ti
   if (!valid) {
     return tl::unexpected(valid.error());
   }
-  return StateOf(
-      link_->Command<SateenState>(SateenArm{.channel = static_cast<std::uint8_t>(channel),
-                                            .level_permille = PermilleOf(level),
-                                            .on_ms = static_cast<std::uint16_t>(on_time.count())}));
+  return Do(SateenArm{.channel = static_cast<std::uint8_t>(channel),
+                      .level_permille = PermilleOf(level),
+                      .on_ms = static_cast<std::uint16_t>(on_time.count())});
 }
 
 Result<BoardState> LightBoard::TriggerShutter(milliseconds press) {
@@ -248,8 +310,7 @@ Result<BoardState> LightBoard::TriggerShutter(milliseconds press) {
     return Fail(ErrorCode::kInvalidArgument, "shutter press of {} ms; needs 1 to {} ms",
                 press.count(), SATEEN_LONGEST_PRESS_MS);
   }
-  return StateOf(link_->Command<SateenState>(
-      SateenTriggerShutter{.press_ms = static_cast<std::uint16_t>(press.count())}));
+  return Do(SateenTriggerShutter{.press_ms = static_cast<std::uint16_t>(press.count())});
 }
 
 Result<BoardState> LightBoard::Limit(int channel, const LightLimits& limits) {
@@ -266,16 +327,16 @@ Result<BoardState> LightBoard::Limit(int channel, const LightLimits& limits) {
   if (!valid) {
     return tl::unexpected(valid.error());
   }
-  const Result<SateenState> answer = link_->Command<SateenState>(
-      SateenLimitLight{.channel = static_cast<std::uint8_t>(channel),
-                       .max_level_permille = PermilleOf(limits.max_level),
-                       .max_on_ms = static_cast<std::uint16_t>(limits.max_on.count())},
-      /*slow=*/true);
+  const Result<BoardState> answer =
+      Do(SateenLimitLight{.channel = static_cast<std::uint8_t>(channel),
+                          .max_level_permille = PermilleOf(limits.max_level),
+                          .max_on_ms = static_cast<std::uint16_t>(limits.max_on.count())},
+         /*slow=*/true);
   if (answer) {
     info_.lights[static_cast<std::size_t>(channel)] = {
         .max_level = LevelOf(PermilleOf(limits.max_level)), .max_on = limits.max_on};
   }
-  return StateOf(answer);
+  return answer;
 }
 
 Result<BoardState> LightBoard::Configure(const BoardSettings& settings) {
@@ -286,25 +347,23 @@ Result<BoardState> LightBoard::Configure(const BoardSettings& settings) {
                 "max_lit {} needs 1 to {}, and dim_clock {} needs 0 to 2", settings.max_lit,
                 channels, settings.dim_clock);
   }
-  const Result<SateenState> answer = link_->Command<SateenState>(
-      SateenConfigure{.max_lit = static_cast<std::uint8_t>(settings.max_lit),
-                      .dim_clock = static_cast<std::uint8_t>(settings.dim_clock),
-                      .sync_edge = static_cast<std::uint8_t>(settings.sync_rising)},
-      /*slow=*/true);
+  const Result<BoardState> answer =
+      Do(SateenConfigure{.max_lit = static_cast<std::uint8_t>(settings.max_lit),
+                         .dim_clock = static_cast<std::uint8_t>(settings.dim_clock),
+                         .sync_edge = static_cast<std::uint8_t>(settings.sync_rising)},
+         /*slow=*/true);
   if (answer) {
     info_.settings = settings;
   }
-  return StateOf(answer);
+  return answer;
 }
 
 Result<BoardState> LightBoard::ClearFault(int fault) {
-  return StateOf(
-      link_->Command<SateenState>(SateenClearFault{.fault = static_cast<std::uint8_t>(fault)}));
+  return Do(SateenClearFault{.fault = static_cast<std::uint8_t>(fault)});
 }
 
 Result<BoardState> LightBoard::Hang(bool interrupts) {
-  return StateOf(
-      link_->Command<SateenState>(SateenHang{.interrupts = static_cast<std::uint8_t>(interrupts)}));
+  return Do(SateenHang{.interrupts = static_cast<std::uint8_t>(interrupts)});
 }
 
 }  // namespace sateen

@@ -3,6 +3,7 @@
 #include <chrono>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -67,6 +68,11 @@ struct BoardReport {
 // Returns the meaning of the number in words.
 [[nodiscard]] std::string FaultText(int fault);
 
+// Returns the channels whose bit is set.
+[[nodiscard]] std::vector<int> LitChannels(unsigned lit);
+// Returns "light 5", "lights 5 and 6", "no light".
+[[nodiscard]] std::string LightsText(unsigned lit);
+
 struct LightBoardOptions {
   // Longest wait for one answer before the command is sent again; at least 1 ms.
   std::chrono::milliseconds answer_timeout{60};
@@ -98,11 +104,16 @@ struct LightBoardOptions {
 /// executes it once. Its answer is the state after it. Bytes that are no frame are skipped, answers
 /// to other commands ignored.
 ///
+/// A command has succeeded where the board's answer says so: all off and no light is on, set light
+/// and this light is on at this level, alone unless others were added. Another answer is an error
+/// that tells it, and the state stays kReady. A greeting whose values cannot be is no connection.
+///
 /// The board turns everything off when it hears nothing for 2 s: whoever wants a light to stay on
 /// asks for Report() or SetLight() more often. The destructor sends all off; a killed program sends
 /// nothing, and the board's own time-out does it.
 ///
-/// Errors   kDevice: the port is gone, the board restarted, refused, or speaks another protocol
+/// Errors   kDevice: the port is gone, the board restarted, refused, speaks another protocol, or
+///          answers what does not fit the command
 ///          kTimeout: no answer after all tries; what the board does then is not known, but it
 ///          turns everything off within 2 s
 ///          kInvalidArgument: a value out of its range or above the light's limit; nothing was sent
@@ -120,6 +131,8 @@ class LightBoard {
   [[nodiscard]] std::string PortName() const;
   // Returns the information from the last Connect that succeeded.
   [[nodiscard]] const BoardInfo& Info() const;
+  // Returns the state in the latest answer of this connection, also where it was an error.
+  [[nodiscard]] const std::optional<BoardState>& LastSaid() const;
 
   // Tries until the board has greeted or greeting_timeout has passed. From kClosed a port that is
   // not there is an error at once; from other states it is waited for, since it may be plugged in
@@ -127,6 +140,8 @@ class LightBoard {
   [[nodiscard]] Status Connect();
   // Sends all off where the state is kReady, without waiting for the answer.
   void Close() noexcept;
+  // Returns the time of the port's clock.
+  [[nodiscard]] BytePort::Duration Now() const;
   // Waits by the port's clock; commands are not sent meanwhile.
   void Wait(std::chrono::milliseconds time);
 
@@ -148,9 +163,16 @@ class LightBoard {
   [[nodiscard]] Result<BoardState> Hang(bool interrupts);
 
  private:
+  // Sends the command, and checks its answer against it.
+  template <typename Answer, typename Request>
+  [[nodiscard]] Result<Answer> Ask(const Request& request, bool slow = false);
+  template <typename Request>
+  [[nodiscard]] Result<BoardState> Do(const Request& request, bool slow = false);
+
   Status options_status_;
   std::unique_ptr<BoardLink> link_;  // null once moved from, and then only good to be assigned to
   BoardInfo info_;
+  std::optional<BoardState> last_said_;
 };
 
 }  // namespace sateen

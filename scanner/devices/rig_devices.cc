@@ -46,14 +46,6 @@ Result<TetheredCamera*> RigDevices::Camera() {
   return camera_.get();
 }
 
-Status RigDevices::LightsOff() {
-  if (!board_ || board_->state() != LightBoard::State::kReady) {
-    return {};  // a connection begins with all lights off, and a lost one ends so
-  }
-  const Result<BoardState> off = board_->AllOff();
-  return off ? Status{} : tl::unexpected(off.error());
-}
-
 void RigDevices::Release() noexcept {
   if (board_) {
     board_->Close();

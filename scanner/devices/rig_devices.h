@@ -43,9 +43,6 @@ class RigDevices {
   // Returns the camera's answer on opening; nothing where it is not open.
   [[nodiscard]] const std::optional<CameraInfo>& OpenCamera() const { return camera_info_; }
 
-  // Turns all lights off, where there is a board that answers. kDevice, kTimeout: it does not, and
-  // turns everything off by itself within 2 s.
-  [[nodiscard]] Status LightsOff();
   // Turns all lights off and closes both devices.
   void Release() noexcept;
 
