@@ -114,6 +114,13 @@ json GphotoSession::Failure(int code, const std::string& during) {
   return {{"error", {{"code", code}, {"text", text}, {"while", during}}}};
 }
 
+json GphotoSession::Refuse(const Error& error) {
+  return {{"error",
+           {{"code", GP_ERROR_BAD_PARAMETERS},
+            {"text", error.message},
+            {"while", "reading a request"}}}};
+}
+
 json GphotoSession::Do(const json& request) {
   const std::string verb = request.value("do", "");
   const std::string name = request.value("name", "");

@@ -3,6 +3,8 @@
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 
+#include "core/error.h"
+
 // libgphoto2's own names.
 struct _Camera;     // NOLINT(bugprone-reserved-identifier)
 struct _GPContext;  // NOLINT(bugprone-reserved-identifier)
@@ -37,6 +39,8 @@ class GphotoSession {
   ~GphotoSession();
 
   [[nodiscard]] nlohmann::json Do(const nlohmann::json& request);
+  // Returns the answer to what is no request.
+  [[nodiscard]] static nlohmann::json Refuse(const Error& error);
 
  private:
   nlohmann::json List();

@@ -37,8 +37,14 @@ int main() {
   }
   std::thread(EndWithParent).detach();
   sateen::GphotoSession session;
-  while (const auto request = sateen::ReceiveMessage(STDIN_FILENO, std::nullopt)) {
-    if (!sateen::SendMessage(STDIN_FILENO, session.Do(*request))) {
+  while (true) {
+    const auto request = sateen::ReceiveMessage(STDIN_FILENO, std::nullopt);
+    if (!request && request.error().code != sateen::ErrorCode::kBadData) {
+      break;
+    }
+    const nlohmann::json answer =
+        request ? session.Do(*request) : sateen::GphotoSession::Refuse(request.error());
+    if (!sateen::SendMessage(STDIN_FILENO, answer)) {
       break;
     }
   }

@@ -376,6 +376,10 @@ Result<CapturedFile> PtpCamera::Capture(const fs::path& folder, milliseconds lon
 
 Result<CapturedFile> PtpCamera::Fetch(const FileOnCamera& file, const fs::path& folder,
                                       const Deadline& deadline) {
+  if (file.name.find('/') != std::string::npos) {
+    return Fail(ErrorCode::kDevice, "{} at {}: '{}' is no name of a file; take the frame again",
+                info_.model, info_.port, file.name);
+  }
   if (!IsRawName(file.name)) {
     return Fail(ErrorCode::kDevice, "{} at {}: {} is not a RAW file; set the image quality to RAW",
                 info_.model, info_.port, file.name);

@@ -87,6 +87,10 @@ Result<nlohmann::json> WorkerProcess::Ask(const nlohmann::json& request,
       sent ? ReceiveMessage(socket_, longest) : tl::unexpected(sent.error());
   if (!answer) {
     Kill();
+    if (answer.error().code == ErrorCode::kBadData) {
+      return Fail(ErrorCode::kDevice, "the process that talks to the camera sent no answer: {}",
+                  answer.error().message);
+    }
   }
   return answer;
 }
