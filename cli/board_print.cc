@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 #include <ostream>
 
+#include "core/json.h"
 #include "core/output_folder.h"
 #include "core/version.h"
 #include "targets/page.h"
@@ -66,7 +67,7 @@ std::string JsonReport(const BoardPrintArgs& args, const Page& page) {
                                  {"size_mm", pair(page.print.SizeMm())},
                                  {"paper_mm", pair(page.paper_mm)},
                                  {"ruler_mm", page.ruler_mm}};
-  return report.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
+  return JsonText(report) + "\n";
 }
 
 }  // namespace

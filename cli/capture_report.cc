@@ -3,6 +3,7 @@
 #include <set>
 
 #include "cli/capture.h"
+#include "core/json.h"
 #include "core/quantity.h"
 
 namespace sateen::cli {
@@ -95,7 +96,7 @@ std::string CaptureJson(const std::filesystem::path& session, const Rig& rig,
   json["notes"] = check.notes;
   json["seconds"] = summary.seconds;
   json["camera_seconds"] = summary.camera_seconds;
-  return json.dump(2) + "\n";
+  return JsonText(json, 2) + "\n";
 }
 
 std::string ForecastText(const CaptureForecast& forecast) {
@@ -140,7 +141,7 @@ std::string ForecastJson(const CaptureForecast& forecast) {
   if (forecast.exposure_known) {
     json["exposure_s"] = forecast.settings.exposure_s;
   }
-  return json.dump(2) + "\n";
+  return JsonText(json, 2) + "\n";
 }
 
 }  // namespace sateen::cli

@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 #include <vector>
 
+#include "core/json.h"
 #include "core/quantity.h"
 
 namespace sateen::cli {
@@ -91,7 +92,7 @@ std::string StatusJson(const std::string& port, const BoardInfo& info, const Boa
         {"syncs", report.syncs},
         {"flashes", report.flashes},
         {"faults", report.faults}}}};
-  return json.dump(2) + '\n';
+  return JsonText(json, 2) + '\n';
 }
 
 std::string LimitsText(const BoardInfo& info) {

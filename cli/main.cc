@@ -5,6 +5,7 @@
 
 #include "cli/program.h"
 #include "core/interrupt.h"
+#include "core/printable.h"
 #include "core/progress_bar.h"
 
 namespace {
@@ -28,7 +29,7 @@ int main(int argc, char** argv) {
     std::cerr << "sateen: error: out of memory; use smaller images or fewer lights at a time\n";
     return kInternal;
   } catch (const std::exception& error) {
-    std::cerr << "sateen: internal error: " << error.what() << '\n';
+    std::cerr << "sateen: internal error: " << sateen::Printable(error.what()) << '\n';
     return kInternal;
   }
 }

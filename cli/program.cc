@@ -27,6 +27,7 @@
 #include "cli/session_verify.h"
 #include "cli/simulate.h"
 #include "cli/solve.h"
+#include "core/printable.h"
 #include "core/version.h"
 
 namespace sateen::cli {
@@ -68,8 +69,13 @@ CommandTable AddCommands(CLI::App& app) {
 
 }  // namespace
 
-int RunProgram(int argc, const char* const* argv, const Task& task, std::ostream& out,
-               std::ostream& log) {
+int RunProgram(int argc, const char* const* argv, const Task& task, std::ostream& raw_out,
+               std::ostream& raw_log) {
+  // Names from files, cameras and boards are in what is printed; no terminal obeys them.
+  PrintableStream out(raw_out);
+  PrintableStream log(raw_log);
+  log.tie(&out);
+  log << std::unitbuf;
   CLI::App app("Photometric-stereo scanner: from frames to normal and albedo maps", "sateen");
   app.require_subcommand(1);
   app.set_version_flag("--version", "sateen " + Version());

@@ -73,6 +73,13 @@ class JsonReader {
   std::optional<Error> error_;
 };
 
+// Returns the JSON as text, on one line where `indent` is below 0. It is UTF-8 whatever names from
+// elsewhere hold: other bytes become U+FFFD.
+template <typename AnyJson>
+[[nodiscard]] std::string JsonText(const AnyJson& json, int indent = -1) {
+  return json.dump(indent, ' ', false, AnyJson::error_handler_t::replace);
+}
+
 // Parses text. kBadData, with the place, for what is not JSON, for a key given twice and for deep
 // nesting; `where` opens the message.
 [[nodiscard]] Result<nlohmann::json> ParseJson(const std::string& text, const std::string& where);

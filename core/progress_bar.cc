@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cstdint>
 
+#include "core/printable.h"
+
 namespace sateen {
 namespace {
 
@@ -39,7 +41,7 @@ void ProgressBar::BeginStage(std::string_view name, int total) {
     return;
   }
   const std::lock_guard lock(mutex_);
-  stage_ = name;
+  stage_ = Printable(name);
   total_ = total;
   done_ = 0;
   Draw();

@@ -99,12 +99,6 @@ nlohmann::ordered_json ResponseToJson(const Response& response) {
   return json;
 }
 
-// On one line; a name that is not UTF-8 must not end the run.
-template <typename AnyJson>
-std::string Line(const AnyJson& json) {
-  return json.dump(-1, ' ', false, AnyJson::error_handler_t::replace);
-}
-
 Status CheckResponse(const Response& response, std::string_view what) {
   if (!(std::isfinite(response.white) && response.black >= 0.0 &&
         response.black < response.white)) {
@@ -283,20 +277,20 @@ Result<Rig> ReadRig(const std::filesystem::path& path) {
 std::string RigToJson(const Rig& rig) {
   std::vector<std::string> members = {R"(  "schema": "sateen.rig/1")"};
   if (rig.camera) {
-    members.push_back("  \"camera\": " + Line(CameraToJson(*rig.camera)));
+    members.push_back("  \"camera\": " + JsonText(CameraToJson(*rig.camera)));
   }
   if (rig.response) {
-    members.push_back("  \"response\": " + Line(ResponseToJson(*rig.response)));
+    members.push_back("  \"response\": " + JsonText(ResponseToJson(*rig.response)));
   }
   std::vector<std::string> lights;
   for (const Light& light : rig.lights) {
-    lights.push_back("    " + Line(ToJson(light)));
+    lights.push_back("    " + JsonText(ToJson(light)));
   }
   members.push_back(lights.empty()
                         ? R"(  "lights": [])"
                         : fmt::format("  \"lights\": [\n{}\n  ]", fmt::join(lights, ",\n")));
   if (rig.calibration != CalibrationRecords()) {
-    members.push_back("  \"calibration\": " + Line(ToJson(rig.calibration)));
+    members.push_back("  \"calibration\": " + JsonText(ToJson(rig.calibration)));
   }
   return fmt::format("{{\n{}\n}}\n", fmt::join(members, ",\n"));
 }

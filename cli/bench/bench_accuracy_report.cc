@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/bench/bench_accuracy.h"
+#include "core/json.h"
 #include "core/version.h"
 #include "imaging/show/svg_plot.h"
 
@@ -132,7 +133,7 @@ std::string JsonReport(const AccuracyReport& report) {
                                {"instruction_set", report.instruction_set},
                                {"rows", std::move(rows)},
                                {"skipped", report.skipped}};
-  return json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+  return JsonText(json);
 }
 
 std::string TextReport(const AccuracyReport& report) {

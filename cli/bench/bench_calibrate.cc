@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "cli/bench/peak_memory.h"
+#include "core/json.h"
 #include "core/output_folder.h"
 #include "core/parallel.h"
 #include "core/scratch_folder.h"
@@ -79,7 +80,7 @@ class CalibrateBench {
   }
 
   Status SimulateScene(const std::string& name, const json& scene) const {
-    if (Status status = WriteFileWhole(Path(name + ".json"), scene.dump()); !status) {
+    if (Status status = WriteFileWhole(Path(name + ".json"), JsonText(scene)); !status) {
       return status;
     }
     const SimulateOptions options{.scene = Path(name + ".json"), .output = Path(name)};

@@ -1,6 +1,7 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/bench/bench_calibrate.h"
+#include "core/json.h"
 
 namespace sateen::cli {
 
@@ -71,7 +72,7 @@ std::string JsonReport(const CalibrateBenchReport& report) {
          {"flux", {ratios.flux[0], ratios.flux[1], ratios.flux[2]}},
          {"direction", ratios.direction}});
   }
-  return json.dump() + "\n";
+  return JsonText(json) + "\n";
 }
 
 }  // namespace sateen::cli

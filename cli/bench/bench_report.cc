@@ -5,6 +5,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "core/json.h"
 #include "imaging/show/svg_plot.h"
 
 namespace sateen::cli {
@@ -77,7 +78,7 @@ std::string JsonReport(const BenchReport& report) {
                               {"max", row.angular_error_deg.max}}},
                             {"albedo_error", row.albedo_error}});
   }
-  return json.dump();
+  return JsonText(json);
 }
 
 std::string TextReport(const BenchReport& report) {

@@ -2,6 +2,8 @@
 
 #include <nlohmann/json.hpp>
 
+#include "core/json.h"
+
 namespace sateen::cli {
 
 std::string TextReport(const SimulateBenchReport& report) {
@@ -51,7 +53,7 @@ std::string JsonReport(const SimulateBenchReport& report) {
                                 {"mean_angular_error_deg", one.angular_error_deg.mean},
                                 {"p99_angular_error_deg", one.angular_error_deg.p99}});
   }
-  return json.dump(2) + "\n";
+  return JsonText(json, 2) + "\n";
 }
 
 }  // namespace sateen::cli

@@ -3,6 +3,7 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
+#include "core/json.h"
 #include "pipelines/calibrate/calibrate_lens.h"
 #include "pipelines/calibrate/calibrate_lights.h"
 #include "pipelines/calibrate/calibrate_pose.h"
@@ -19,7 +20,7 @@ std::string WithFiles(nlohmann::json report, const RigCalibration& result,
   report["output"] = result.output.string();
   report[former_key] = result.former_output.string();
   report["pictures"] = result.pictures.string();
-  return report.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+  return JsonText(report);
 }
 
 }  // namespace

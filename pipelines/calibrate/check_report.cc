@@ -2,6 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "core/json.h"
 #include "core/version.h"
 
 namespace sateen {
@@ -68,7 +69,7 @@ std::string CheckToJson(const CalibrationCheckOptions& options, const Calibratio
                                 {"folds_percent", 100.0 * sheet.folds},
                                 {"steepest_fold_deg", sheet.steepest_deg}});
   }
-  return report.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+  return JsonText(report);
 }
 
 }  // namespace sateen

@@ -2,6 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "core/json.h"
 #include "core/version.h"
 #include "imaging/encoding_name.h"
 
@@ -144,7 +145,7 @@ std::string SolveReportJson(const SolveOptions& options, const SolveOutcome& out
   AddOptional(options, outcome, report);
   AddEvaluation(options, outcome, report);
   // A path that is not UTF-8 must not end the run.
-  return report.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+  return JsonText(report);
 }
 
 }  // namespace sateen

@@ -187,9 +187,7 @@ class JournalReader {
   std::vector<bool> is_begun_;
 };
 
-std::string LineOf(const nlohmann::ordered_json& record) {
-  return record.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
-}
+std::string LineOf(const nlohmann::ordered_json& record) { return JsonText(record) + "\n"; }
 
 nlohmann::ordered_json OfFrame(const char* record, std::size_t frame) {
   return {{"record", record}, {"frame", frame}};

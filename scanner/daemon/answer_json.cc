@@ -26,9 +26,7 @@ constexpr std::array<std::pair<ErrorCode, std::string_view>, 7> kCodes = {
      {ErrorCode::kCancelled, "cancelled"}}};
 
 // Writes JSON as one line. Messages echo requests and paths, which need not be UTF-8.
-std::string OneLine(const ordered_json& json) {
-  return json.dump(-1, ' ', false, ordered_json::error_handler_t::replace);
-}
+std::string OneLine(const ordered_json& json) { return JsonText(json); }
 
 // Returns "2026-11-26T06:31:07Z".
 std::string TimeText(system_clock::time_point time) {

@@ -87,9 +87,7 @@ Status CheckPosted(const CaptureRequest& request) {
   return valid ? Status{} : Fail(ErrorCode::kInvalidArgument, "request: {}", valid.error().message);
 }
 
-std::string Dump(const ordered_json& json) {
-  return json.dump(-1, ' ', false, ordered_json::error_handler_t::replace);
-}
+std::string Dump(const ordered_json& json) { return JsonText(json); }
 
 ordered_json FromClient(const std::string& client) {
   return client.empty() ? ordered_json::object() : ordered_json{{"client", client}};

@@ -38,7 +38,7 @@ BoardState ReadState(JsonReader& json) {
 }  // namespace
 
 std::string LitJson(const BoardState& state) {
-  return ordered_json({{"lit", LitChannels(state.lit)}}).dump();
+  return JsonText(ordered_json({{"lit", LitChannels(state.lit)}}));
 }
 
 Status NoneLitFromJson(const std::string& text) {
@@ -81,7 +81,7 @@ std::string BoardJson(const BoardWord& board) {
   for (const auto& [key, member] : kCounts) {
     json[key] = report.*member;
   }
-  return json.dump(-1, ' ', false, ordered_json::error_handler_t::replace);
+  return JsonText(json);
 }
 
 Result<BoardWord> BoardFromJson(const std::string& text) {

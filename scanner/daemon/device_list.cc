@@ -98,7 +98,7 @@ std::string DevicesJson(const std::vector<DeviceReply>& devices, int indent) {
   for (const DeviceReply& device : devices) {
     json["devices"].push_back(DeviceJson(device));
   }
-  return json.dump(indent, ' ', false, nlohmann::json::error_handler_t::replace);
+  return JsonText(json, indent);
 }
 
 Result<std::vector<DeviceReply>> DevicesFromJson(const std::string& text) {

@@ -6,6 +6,7 @@
 #include <string_view>
 #include <utility>
 
+#include "core/json.h"
 #include "pipelines/solve/solve.h"
 
 namespace sateen {
@@ -39,7 +40,7 @@ class JobProgress : public Progress {
  private:
   void Report() {
     const nlohmann::ordered_json event = {{"stage", stage_}, {"done", done_}, {"total", total_}};
-    job_.Report(event.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
+    job_.Report(JsonText(event));
   }
 
   JobContext& job_;

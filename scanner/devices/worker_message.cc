@@ -131,7 +131,7 @@ Status ReceiveAll(int socket, char* bytes, size_t size,
 
 Status SendMessage(int socket, const nlohmann::json& message) {
   // A camera's names may hold any bytes.
-  const std::string text = message.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+  const std::string text = JsonText(message);
   std::string bytes;
   for (int k = 0; k < 4; ++k) {
     bytes.push_back(static_cast<char>(text.size() >> (8 * k) & 0xFF));
@@ -173,7 +173,8 @@ Result<nlohmann::json> ReceiveMessage(int socket, std::optional<milliseconds> lo
   }
   Result<nlohmann::json> message = ParseJson(text, "message");  // not nested without end
   if (message && !message->is_object()) {
-    return Fail(ErrorCode::kBadData, "the message is of type {}; need an object", message->type_name());
+    return Fail(ErrorCode::kBadData, "the message is of type {}; need an object",
+                message->type_name());
   }
   if (const Status typed = message ? CheckFields(*message) : Status(); !typed) {
     return tl::unexpected(typed.error());

@@ -117,7 +117,7 @@ std::string SessionToJson(const Session& session) {
     json["journal"] = kJournalName;
   }
   // A file name that is not UTF-8 must not end the run; reading will say that it is not there.
-  return json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
+  return JsonText(json, 2) + "\n";
 }
 
 }  // namespace sateen

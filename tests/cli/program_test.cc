@@ -2,9 +2,13 @@
 
 #include <gmock/gmock.h>
 
+#include <filesystem>
 #include <sstream>
 #include <string>
 #include <vector>
+
+#include "core/printable.h"
+#include "tests/testing/files.h"
 
 namespace sateen::program_test {
 namespace {
@@ -83,6 +87,35 @@ TEST(Program, RunsTheCommandThatIsTyped) {
       RunSateen({"board", "print", "hexagons:1x1", "-o", "/nonexistent/board.pdf"});
   EXPECT_EQ(board.exit_status, 2);
   EXPECT_THAT(board.log, StartsWith("sateen board print: error: "));
+}
+
+// A terminal would obey: clear its screen, change its title, type a line.
+TEST(Program, NoNameReachesTheTerminalAsAnEscape) {
+  const testing::TempFolder temp;
+  const std::string name =
+      "led\x1b]0;title\a\x1b[2J\xc2\x9b"
+      "5n\x7f\r\xff";
+  const std::filesystem::path folder = temp.Path() / name;
+  std::filesystem::create_directory(folder);
+  const std::string path = folder.string();
+  testing::WriteText(folder / "session.json", R"({"schema":"\u001b[31m\u009b/1"})");
+  testing::WriteText(folder / "rig.json",
+                     R"({"schema":"sateen.rig/1","lights":[{"name":"\u001b[2J\u009b1m"}]})");
+  for (const std::vector<const char*>& words : std::vector<std::vector<const char*>>{
+           {"solve", path.c_str(), "-o", "/nonexistent/maps"},
+           {"session", "verify", path.c_str()},
+           {"calibrate", "check", path.c_str()},
+           {"simulate", path.c_str(), "-o", "/nonexistent/session"},
+           {"light", name.c_str(), "--level", name.c_str()},
+           {"light", name.c_str(), "--port", path.c_str()},
+           {"light", name.c_str(), "--port", "/nonexistent", "--rig",
+            (folder / "rig.json").c_str()},
+           {name.c_str()}}) {
+    const Outcome run = RunSateen(words);
+    EXPECT_NE(run.exit_status, 0) << words[0];
+    const std::string text = run.out + run.log;
+    EXPECT_EQ(text, Printable(text)) << words[0];
+  }
 }
 
 TEST(Program, AWrongCommandLineIsStatusTwo) {

@@ -1,5 +1,7 @@
 #include "scanner/sessions/files/pose_json.h"
 
+#include "core/json.h"
+
 namespace sateen {
 namespace {
 
@@ -34,7 +36,7 @@ std::vector<double> RowMajor(const Eigen::Isometry3d& transform) {
 std::string TruePoseToJson(const Eigen::Isometry3d& table_from_target) {
   const nlohmann::ordered_json json{{"schema", "sateen.pose/1"},
                                     {kPoseKey, RowMajor(table_from_target)}};
-  return json.dump(2) + "\n";
+  return JsonText(json, 2) + "\n";
 }
 
 Result<std::optional<Eigen::Isometry3d>> ReadTruePose(const std::filesystem::path& dir) {
