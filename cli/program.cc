@@ -94,7 +94,8 @@ int RunProgram(int argc, const char* const* argv, const Task& task, std::ostream
   }
   const int status = table.RunTyped(task, out, log);
   if (status == 0 && !out.flush()) {
-    log << "sateen: error: standard output cannot be written; is the disk full?\n";
+    log << "sateen: error: standard output cannot be written; is the disk full, or its reader "
+           "gone?\n";
     return kInputOutput;
   }
   return status;

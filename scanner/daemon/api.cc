@@ -110,11 +110,15 @@ int HttpStatus(ErrorCode code) {
 }
 
 ApiResponse RefusedUnbegun(const Error& error) {
-  return Refused(error.code == ErrorCode::kInvalidArgument ? 400 : 422, error);
+  return Refused(error.code == ErrorCode::kIo ? 422 : HttpStatus(error.code), error);
+}
+
+bool IsLightsOff(const std::string& method, const std::string& path) {
+  return method == "POST" && path == "/v1/lights/off";
 }
 
 Api::Api(RigService& service, ApiOptions options)
-    : service_(service), options_(std::move(options)) {}
+    : service_(service), options_(std::move(options)), files_(options_.files) {}
 
 ApiResponse Api::Handle(const ApiRequest& request) const {
   std::string allow;
@@ -148,25 +152,31 @@ ApiResponse Api::GetState(const ApiRequest& /*request*/, Parameter /*none*/) con
 }
 
 ApiResponse Api::GetDevices(const ApiRequest& request, Parameter /*none*/) const {
-  return RunToEnd(DevicesJob(request.who));
+  return RunToEnd(request, DevicesJob(request.who));
 }
 
 ApiResponse Api::GetBoard(const ApiRequest& request, Parameter /*none*/) const {
-  return RunToEnd(BoardJob({}, request.who));
+  return RunToEnd(request, BoardJob({}, request.who));
 }
 
 ApiResponse Api::PostBoard(const ApiRequest& request, Parameter /*none*/) const {
   const Result<PostedBoardChange> posted = BoardChangeFromJson(request.body);
-  return posted ? RunToEnd(BoardJob(posted->change, OwnerName(posted->client, request.who)))
-                : Refused(400, posted.error());
+  return posted
+             ? RunToEnd(request, BoardJob(posted->change, OwnerName(posted->client, request.who)))
+             : Refused(400, posted.error());
 }
 
 ApiResponse Api::GetJobs(const ApiRequest& /*request*/, Parameter /*none*/) const {
   return {.body = JobsJson(service_.Jobs())};
 }
 
-std::optional<ApiResponse> Api::CannotBegin(const Status& checked) const {
+std::optional<ApiResponse> Api::CannotBegin(const ApiRequest& request,
+                                            std::function<Status()> check) const {
   // A job that has the rig matters more, and Begin() answers with it.
+  if (service_.State().job) {
+    return std::nullopt;
+  }
+  const Status checked = files_.Run(std::move(check), request.client_left);
   return checked || service_.State().job ? std::nullopt
                                          : std::optional(RefusedUnbegun(checked.error()));
 }
@@ -183,11 +193,12 @@ ApiResponse Api::PostJob(const ApiRequest& request, Parameter /*none*/) const {
   if (!posted) {
     return Refused(400, posted.error());
   }
-  if (auto refused = CannotBegin(CheckCapture(posted->request))) {
+  if (auto refused =
+          CannotBegin(request, [asked = posted->request] { return CheckCapture(asked); })) {
     return *std::move(refused);
   }
   std::string owner = OwnerName(posted->client, request.who);
-  return posted->dry_run ? RunToEnd(ForecastJob(posted->request, std::move(owner)))
+  return posted->dry_run ? RunToEnd(request, ForecastJob(posted->request, std::move(owner)))
                          : Begin(CaptureJob(posted->request, std::move(owner)));
 }
 
@@ -201,7 +212,8 @@ ApiResponse Api::PostPreviewJob(const ApiRequest& request) const {
                          "request: output: is missing; need the file of the picture, an absolute "
                          "path, or POST /v1/preview, which answers with the picture"});
   }
-  if (auto refused = CannotBegin(CheckPreview(posted->request))) {
+  if (auto refused =
+          CannotBegin(request, [asked = posted->request] { return CheckPreview(asked); })) {
     return *std::move(refused);
   }
   return Begin(
@@ -243,20 +255,30 @@ ApiResponse Api::GetEvents(const ApiRequest& request, Parameter id) const {
 }
 
 // Turns all lights off. For safety it is never refused for a job that runs: that job is cancelled,
-// and so is one that gets in between.
+// and so is one that gets in between. It goes on when its client has left.
 ApiResponse Api::PostLightsOff(const ApiRequest& request, Parameter /*none*/) const {
   const auto deadline = std::chrono::steady_clock::now() + options_.off_wait;
   while (true) {
-    const tl::expected<JobRecord, JobRefusal> ended = service_.RunToEnd(LightsOffJob(request.who));
-    if (ended || !ended.error().holder) {
-      return Ended(ended);
+    const tl::expected<std::uint64_t, JobRefusal> off = service_.Begin(LightsOffJob(request.who));
+    if (!off && !off.error().holder) {
+      return RefusedBusy(off.error());
     }
-    const JobRecord& holder = *ended.error().holder;
-    service_.Cancel(holder.id, request.who);
+    const std::uint64_t id = off ? *off : off.error().holder->id;
+    if (!off) {
+      service_.Cancel(id, request.who);
+    }
     const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(
         deadline - std::chrono::steady_clock::now());
-    if (left.count() <= 0 || !service_.WaitIdle(left)) {
-      return {.status = 202, .body = JobJson(service_.Find(holder.id).value_or(holder))};
+    const JobWait wait = service_.AwaitEnd(id, std::max(left, std::chrono::milliseconds(0)));
+    const JobRecord job = service_.Find(id).value_or(JobRecord{.id = id, .state = JobState::kDone});
+    if (wait == JobWait::kBoardLost) {
+      return Refused(503, {ErrorCode::kDevice, service_.State().lights_fault});
+    }
+    if (wait == JobWait::kRunning) {
+      return {.status = 202, .body = JobJson(job)};
+    }
+    if (off) {
+      return Ended(job);
     }
   }
 }
@@ -266,12 +288,13 @@ ApiResponse Api::PostPreview(const ApiRequest& request, Parameter /*none*/) cons
   if (!posted) {
     return Refused(400, posted.error());
   }
-  if (auto refused = CannotBegin(CheckPreview(posted->request))) {
+  if (auto refused =
+          CannotBegin(request, [asked = posted->request] { return CheckPreview(asked); })) {
     return *std::move(refused);
   }
   const auto jpeg = std::make_shared<std::string>();
-  ApiResponse response = RunToEnd(
-      PreviewJob(posted->request, posted->output, jpeg, OwnerName(posted->client, request.who)));
+  ApiResponse response = RunToEnd(request, PreviewJob(posted->request, posted->output, jpeg,
+                                                      OwnerName(posted->client, request.who)));
   if (!jpeg->empty()) {
     response.body = std::move(*jpeg);
     response.content_type = "image/jpeg";
@@ -292,7 +315,7 @@ ApiResponse Api::PostLight(const ApiRequest& request, Parameter channel) const {
   }
   // A board that nobody has asked yet is asked first.
   if (!service_.State().board) {
-    if (ApiResponse asked = RunToEnd(BoardJob({}, request.who)); asked.status != 200) {
+    if (ApiResponse asked = RunToEnd(request, BoardJob({}, request.who)); asked.status != 200) {
       return asked;
     }
   }
@@ -310,6 +333,8 @@ ApiResponse Api::Begin(JobRequest job) const {
   return id ? ApiResponse{.status = 202, .body = BegunJson(*id)} : RefusedBusy(id.error());
 }
 
-ApiResponse Api::RunToEnd(JobRequest job) const { return Ended(service_.RunToEnd(std::move(job))); }
+ApiResponse Api::RunToEnd(const ApiRequest& request, JobRequest job) const {
+  return Ended(service_.RunToEnd(std::move(job), request.client_left));
+}
 
 }  // namespace sateen

@@ -1,10 +1,12 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <string>
 
 #include "scanner/capture/capture_options.h"
+#include "scanner/daemon/file_desk.h"
 #include "scanner/daemon/rig_service.h"
 
 namespace sateen {
@@ -16,6 +18,7 @@ struct ApiRequest {
   std::string body;
   std::string who;                             // client as the transport knows it
   std::optional<std::uint64_t> last_event_id;  // value of Last-Event-ID
+  ClientLeft client_left;                      // ends waiting for a job or a file
 };
 
 struct ApiResponse {
@@ -32,16 +35,21 @@ struct ApiResponse {
   std::optional<Events> events;
 };
 
+// Returns whether this call turns all lights off: it is never refused, and needs no body.
+[[nodiscard]] bool IsLightsOff(const std::string& method, const std::string& path);
+
 // Returns the answer to a refused request: the status, and an error in JSON.
 [[nodiscard]] ApiResponse Refused(int status, const Error& error);
 // Returns 400, 422, 500, 503 or 504.
 [[nodiscard]] int HttpStatus(ErrorCode code);
-// Returns the answer for an argument with which no job could begin: 400, or 422 for a file.
+// Returns the answer for an argument with which no job could begin: 400, or 422 for a file that is
+// bad or cannot be read. Where that is not known, because the file does not come, as HttpStatus.
 [[nodiscard]] ApiResponse RefusedUnbegun(const Error& error);
 
 struct ApiOptions {
   std::string version;
   CaptureOptions capture;  // defaults for what a capture request does not say
+  FileDesk::Options files;
   // How long turning the lights off waits for the job that it has cancelled.
   std::chrono::milliseconds off_wait{10'000};
 };
@@ -74,13 +82,18 @@ class Api {
 
   [[nodiscard]] ApiResponse PostPreviewJob(const ApiRequest& request) const;
   [[nodiscard]] ApiResponse PostSolveJob(const ApiRequest& request) const;
-  // Returns the job's immediate error. Returns nothing if it may begin or another job has the rig.
-  [[nodiscard]] std::optional<ApiResponse> CannotBegin(const Status& checked) const;
-  [[nodiscard]] ApiResponse Begin(JobRequest job) const;     // 202, or 409
-  [[nodiscard]] ApiResponse RunToEnd(JobRequest job) const;  // 200, 409, or the job's error
+  // Returns the immediate error of a job that reads files of the client. `check` reads them, beside
+  // the connection, and owns all that it uses. Returns nothing if the job may begin or another job
+  // has the rig.
+  [[nodiscard]] std::optional<ApiResponse> CannotBegin(const ApiRequest& request,
+                                                       std::function<Status()> check) const;
+  [[nodiscard]] ApiResponse Begin(JobRequest job) const;  // 202, or 409
+  // 200, 409, or the job's error
+  [[nodiscard]] ApiResponse RunToEnd(const ApiRequest& request, JobRequest job) const;
 
   RigService& service_;
   ApiOptions options_;
+  FileDesk files_;
 };
 
 }  // namespace sateen

@@ -3,7 +3,13 @@
 namespace sateen {
 namespace {
 
-using std::chrono::milliseconds;
+Status CheckChannel(const BoardChange& change, const LightBoard& board) {
+  const int channels = static_cast<int>(board.Info().lights.size());
+  const bool known = !change.channel || (*change.channel >= 0 && *change.channel < channels);
+  return known ? Status{}
+               : Fail(ErrorCode::kInvalidArgument, "channel {}: the board has lights 0 to {}",
+                      *change.channel, channels - 1);
+}
 
 bool ChangesLimits(const BoardChange& change) { return change.max_level || change.max_on; }
 
@@ -19,9 +25,7 @@ Status ChangeLimits(const BoardChange& change, LightBoard& board) {
   const int last = change.channel.value_or(static_cast<int>(board.Info().lights.size()) - 1);
   for (int channel = first; channel <= last; ++channel) {
     const auto index = static_cast<std::size_t>(channel);
-    const LightLimits old = channel >= 0 && index < board.Info().lights.size()
-                                ? board.Info().lights[index]
-                                : LightLimits{.max_on = milliseconds(1)};
+    const LightLimits old = board.Info().lights[index];
     const Result<BoardState> set =
         board.Limit(channel, {.max_level = change.max_level.value_or(old.max_level),
                               .max_on = change.max_on.value_or(old.max_on)});
@@ -47,6 +51,9 @@ Status ChangeSettings(const BoardChange& change, LightBoard& board) {
 }  // namespace
 
 Result<BoardWord> ChangeBoard(const BoardChange& change, LightBoard& board) {
+  if (const Status known = CheckChannel(change, board); !known) {
+    return tl::unexpected(known.error());
+  }
   if (change.clear_fault) {
     const Result<BoardReport> before = board.Report();
     if (!before) {

@@ -30,7 +30,8 @@ struct BoardChange {
 
 /// Makes the changes, one after the other, and asks the board.
 ///
-/// Errors  as LightBoard; what was changed before the error stays changed
+/// Errors  kInvalidArgument: the board has no such channel, and nothing was changed; as LightBoard:
+///         what was changed before the error stays changed
 [[nodiscard]] Result<BoardWord> ChangeBoard(const BoardChange& change, LightBoard& board);
 
 }  // namespace sateen

@@ -42,10 +42,19 @@ std::string ProgramName(pid_t pid) {
   return fmt::format(" ({})", name);
 }
 
+bool IsUnixSocket(int fd) {
+  int domain = 0;
+  socklen_t size = sizeof domain;
+  return getsockopt(fd, SOL_SOCKET, SO_DOMAIN, &domain, &size) == 0 && domain == AF_UNIX;
+}
+
 }  // namespace
 
 Connection::Connection(int fd, const ConnectionLimits& limits)
-    : fd_(fd), limits_(limits), deadline_(steady_clock::now() + limits.read) {}
+    : fd_(fd),
+      gone_(static_cast<short>(POLLHUP | POLLERR | (IsUnixSocket(fd) ? 0 : POLLRDHUP))),
+      limits_(limits),
+      deadline_(steady_clock::now() + limits.read) {}
 
 Connection::~Connection() {
   // A socket that is closed with something unread in it takes the answer away from the client.
@@ -73,24 +82,27 @@ bool Connection::WaitFor(short what, milliseconds longest) const {
   return ready > 0;
 }
 
-bool Connection::IsOpen() const {
-  pollfd entry = {.fd = fd_, .events = POLLRDHUP};
-  return poll(&entry, 1, 0) == 0 || (entry.revents & (POLLRDHUP | POLLHUP | POLLERR)) == 0;
+bool Connection::HasLeft() const {
+  pollfd entry = {.fd = fd_, .events = gone_};
+  return poll(&entry, 1, 0) > 0 && (entry.revents & gone_) != 0;
 }
 
-bool Connection::Read(std::string& into) {
+Heard Connection::Read(std::string& into) {
+  if (bytes_read_ >= limits_.request_bytes) {
+    return Heard::kFull;
+  }
   const auto left = std::chrono::duration_cast<milliseconds>(deadline_ - steady_clock::now());
-  if (bytes_read_ >= limits_.request_bytes || left.count() <= 0 || !WaitFor(POLLIN, left)) {
-    return false;
+  if (left.count() <= 0 || !WaitFor(POLLIN, left)) {
+    return Heard::kLate;
   }
   const std::size_t most = std::min(buffer_.size(), limits_.request_bytes - bytes_read_);
   const ssize_t count = recv(fd_, buffer_.data(), most, 0);
   if (count <= 0) {
-    return false;
+    return Heard::kEnd;
   }
   bytes_read_ += static_cast<std::size_t>(count);
   into.append(buffer_.data(), static_cast<std::size_t>(count));
-  return true;
+  return Heard::kBytes;
 }
 
 bool Connection::Write(std::string_view bytes) {

@@ -17,6 +17,14 @@ struct ConnectionLimits {
   std::size_t request_bytes = std::size_t{128} * 1024;
 };
 
+// Outcome of reading from a client.
+enum class Heard {
+  kBytes,
+  kEnd,   // the client sends no more, or has gone
+  kLate,  // the deadline has passed
+  kFull,  // the limit of bytes is reached
+};
+
 /// One accepted connection, with a deadline and a limit for what is read of it.
 class Connection {
  public:
@@ -28,12 +36,13 @@ class Connection {
   // still sends.
   ~Connection();
 
-  // Appends the next bytes to `into`. Returns false at the end, the deadline or the limit.
-  [[nodiscard]] bool Read(std::string& into);
+  // Waits for the next bytes and appends them to `into`.
+  [[nodiscard]] Heard Read(std::string& into);
   // Writes everything. Returns false where the client is gone or takes nothing for too long.
   [[nodiscard]] bool Write(std::string_view bytes);
-  // Returns whether the client is still there.
-  [[nodiscard]] bool IsOpen() const;
+  // Returns whether the client has left. One that has only ended its request is still there; over
+  // TCP the two cannot be told apart, and it counts as gone.
+  [[nodiscard]] bool HasLeft() const;
 
   // Returns "process 4711 (sateen) of alice" on a Unix socket, "127.0.0.1 port 51234" on TCP.
   [[nodiscard]] std::string PeerName() const;
@@ -43,6 +52,7 @@ class Connection {
   [[nodiscard]] bool WaitFor(short what, std::chrono::milliseconds longest) const;
 
   const int fd_;
+  const short gone_;  // what poll() reports of a client that has left
   const ConnectionLimits limits_;
   const std::chrono::steady_clock::time_point deadline_;
   std::size_t bytes_read_ = 0;

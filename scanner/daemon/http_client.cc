@@ -30,6 +30,9 @@ constexpr seconds kSilence{30};
 constexpr milliseconds kStep{20};
 // How often a stream that breaks off is taken up again without having brought anything new.
 constexpr int kResumes = 5;
+// How long a daemon that has too many clients is left alone.
+constexpr milliseconds kLater{200};
+constexpr int kUnavailable = 503;
 
 // Distinguishes a slow daemon from one that has died, which accepts no more connections.
 Error NoAnswer(const std::filesystem::path& socket, const ExchangeFault& fault) {
@@ -39,23 +42,36 @@ Error NoAnswer(const std::filesystem::path& socket, const ExchangeFault& fault) 
                       socket.string(), slow ? "does not answer" : "is gone", fault.why)};
 }
 
-Result<std::string> AskWithin(const std::filesystem::path& socket, seconds patience,
-                              const std::string& method, const std::string& path,
-                              const std::string& body) {
+struct Answer {
+  int status = 0;
+  std::string body;
+};
+
+Result<Answer> AskWithin(const std::filesystem::path& socket, seconds patience,
+                         const std::string& method, const std::string& path,
+                         const std::string& body) {
   std::vector<HttpField> fields = {{"Host", "localhost"}};
   if (method != "GET") {
     fields.emplace_back("Content-Type", "application/json");
   }
-  std::string answer;
+  Answer answer;
   const auto status =
       ExchangeOnUnixSocket(socket, RequestText(method, path, fields, body),
                            {.connecting = kGreeting, .silence = patience},
-                           [&](int /*status*/, std::string_view piece) { answer += piece; });
+                           [&](int /*status*/, std::string_view piece) { answer.body += piece; });
   if (!status) {
     return tl::unexpected(NoAnswer(socket, status.error()));
   }
-  return *status < 300 ? Result<std::string>(std::move(answer))
-                       : tl::unexpected(ErrorFromJson(answer));
+  answer.status = *status;
+  return answer;
+}
+
+Result<std::string> BodyOf(Result<Answer> answer) {
+  if (!answer) {
+    return tl::unexpected(answer.error());
+  }
+  return answer->status < 300 ? Result<std::string>(std::move(answer->body))
+                              : tl::unexpected(ErrorFromJson(answer->body));
 }
 
 // Follows a job to its end, in a thread of its own, so that a cancelled task is heard meanwhile.
@@ -69,7 +85,8 @@ class Follower {
   ~Follower() { thread_.join(); }
 
   [[nodiscard]] bool Ended() const { return ended_; }
-  // Once it has ended.
+  // Both once it has ended. A job whose end was not heard may go on.
+  [[nodiscard]] bool HeardTheEnd() const { return complete_; }
   [[nodiscard]] const Result<std::string>& Outcome() const { return outcome_; }
 
  private:
@@ -97,7 +114,7 @@ class Follower {
     ended_ = true;
   }
 
-  // Returns false where the daemon refuses, or nobody is there any more.
+  // Returns false where the daemon refuses for good, or nobody is there any more.
   bool FollowOnce() {
     const std::vector<HttpField> fields = {{"Host", "localhost"},
                                            {"Last-Event-ID", std::to_string(last_event_)}};
@@ -119,7 +136,8 @@ class Follower {
     }
     if (status && *status != 200) {
       outcome_ = tl::unexpected(ErrorFromJson(refusal));
-      return false;
+      std::this_thread::sleep_for(*status == kUnavailable ? kLater : milliseconds(0));
+      return *status == kUnavailable;
     }
     outcome_ = tl::unexpected(
         NoAnswer(socket_, status ? ExchangeFault{.why = "its events ended before the job"}
@@ -147,7 +165,7 @@ DaemonClient::DaemonClient(std::filesystem::path socket) : socket_(std::move(soc
 
 Result<std::string> DaemonClient::Ask(const std::string& method, const std::string& path,
                                       const std::string& body) const {
-  return AskWithin(socket_, kPatience, method, path, body);
+  return BodyOf(AskWithin(socket_, kPatience, method, path, body));
 }
 
 Result<std::string> DaemonClient::RunJob(const std::string& path, const std::string& body,
@@ -169,6 +187,10 @@ Result<std::string> DaemonClient::RunJob(const std::string& path, const std::str
       [[maybe_unused]] const auto ignored = Ask("DELETE", fmt::format("/v1/jobs/{}", *id));
     }
   }
+  if (!follower.HeardTheEnd()) {
+    // Nobody is left to watch it.
+    [[maybe_unused]] const auto ignored = Ask("DELETE", fmt::format("/v1/jobs/{}", *id));
+  }
   return follower.Outcome();
 }
 
@@ -183,8 +205,11 @@ Result<std::optional<DaemonClient>> FindDaemon() {
     if (place.empty() || !Accepts(place)) {
       continue;
     }
-    if (const auto state = AskWithin(place, kGreeting, "GET", "/v1/state", ""); !state) {
-      return tl::unexpected(state.error());
+    Result<Answer> state = AskWithin(place, kGreeting, "GET", "/v1/state", "");
+    // One that has too many clients is a daemon, and turns the lights off all the same.
+    const bool is_full = state && state->status == kUnavailable;
+    if (const Result<std::string> body = BodyOf(std::move(state)); !body && !is_full) {
+      return tl::unexpected(body.error());
     }
     return std::optional<DaemonClient>(DaemonClient(place));
   }

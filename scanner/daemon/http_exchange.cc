@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <charconv>
 #include <chrono>
 #include <utility>
@@ -46,16 +47,36 @@ class StreamSlot {
 
 }  // namespace
 
-HttpExchange::HttpExchange(Connection& connection, const ExchangeContext& context)
-    : connection_(connection), context_(context) {}
+AccessHeaders AccessHeadersOf(const HttpRequest& request) {
+  return {.host = request.AllOf("Host"),
+          .authorization = request.AllOf("Authorization"),
+          .has_origin = request.FirstOf("Origin").has_value()};
+}
+
+HttpExchange::HttpExchange(Connection& connection, const ExchangeContext& context,
+                           std::string begun)
+    : connection_(connection), context_(context), unread_(std::move(begun)) {}
 
 std::optional<std::string> HttpExchange::ReadHead() {
-  std::string bytes;
+  std::string bytes = std::exchange(unread_, std::string());
+  std::size_t searched = 0;
   std::optional<std::size_t> size;
-  while (!(size = HeadSize(bytes)) && bytes.size() < kMaxHead) {
-    if (!connection_.Read(bytes)) {
-      return std::nullopt;
+  while (!(size = HeadSize(bytes, searched)) && bytes.size() < kMaxHead) {
+    searched = bytes.size();
+    const Heard heard = connection_.Read(bytes);
+    if (heard == Heard::kBytes) {
+      continue;
     }
+    if (context_.stopping) {
+      Send(Refused(503, {ErrorCode::kDevice, "the daemon is ending; start it again"}));
+    } else if (heard == Heard::kLate) {
+      Send(RefusedBody(
+          408, fmt::format("the request did not come within {:g} s",
+                           std::chrono::duration<double>(context_.options.client_time).count())));
+    } else if (!bytes.empty()) {
+      Send(RefusedBody(400, "the request ends before the empty line that ends its head"));
+    }
+    return std::nullopt;
   }
   if (!size) {
     Send(RefusedBody(400, fmt::format("the head has more than {} bytes", kMaxHead)));
@@ -73,7 +94,7 @@ void HttpExchange::Run() {
   }
   const Result<HttpRequest> request = ParseRequest(*head);
   if (!request) {
-    Send(RefusedBody(400, "this is not an HTTP/1.1 request; docs/api.md has examples"));
+    Send(RefusedBody(400, request.error().message + "; docs/api.md has examples"));
     return;
   }
   head_only_ = request->method == "HEAD";
@@ -86,21 +107,21 @@ ApiResponse HttpExchange::Answer(const HttpRequest& request) {
                                         request.path.size(), kMaxTarget));
   }
   if (context_.access) {
-    const AccessHeaders headers = {.host = request.AllOf("Host"),
-                                   .authorization = request.AllOf("Authorization"),
-                                   .has_origin = request.FirstOf("Origin").has_value()};
-    if (std::optional<ApiResponse> refused = context_.access->Check(headers)) {
+    if (std::optional<ApiResponse> refused = context_.access->Check(AccessHeadersOf(request))) {
       return *std::move(refused);
     }
   }
-  tl::expected<std::string, ApiResponse> body = ReadBody(request);
+  // What turns the lights off does not wait for a body.
+  tl::expected<std::string, ApiResponse> body =
+      IsLightsOff(request.method, request.path) ? std::string() : ReadBody(request);
   if (!body) {
     return std::move(body.error());
   }
   ApiRequest asked = {.method = request.method,
                       .path = request.path,
                       .body = *std::move(body),
-                      .who = connection_.PeerName()};
+                      .who = connection_.PeerName(),
+                      .client_left = [&] { return context_.stopping || connection_.HasLeft(); }};
   if (const std::optional<std::string> last = request.FirstOf("Last-Event-ID")) {
     asked.last_event_id = Digits<std::uint64_t>(*last);
     if (!asked.last_event_id) {
@@ -142,9 +163,11 @@ tl::expected<std::string, ApiResponse> HttpExchange::ReadBody(const HttpRequest&
   }
   std::string body = std::move(unread_);
   while (body.size() < *length) {
-    if (!connection_.Read(body)) {
-      return refuse(408,
-                    fmt::format("{} of {} bytes of the body came in time", body.size(), *length));
+    const Heard heard = connection_.Read(body);
+    if (heard != Heard::kBytes) {
+      return refuse(heard == Heard::kLate ? 408 : 400,
+                    fmt::format("{} of {} bytes of the body came{}", body.size(), *length,
+                                heard == Heard::kLate ? " in time" : "; need all of them"));
     }
   }
   body.resize(*length);
@@ -180,20 +203,27 @@ void HttpExchange::Send(const ApiResponse& answer) {
 }
 
 void HttpExchange::SendEvents(const ApiResponse::Events& events) {
+  using std::chrono::steady_clock;
   const StreamSlot slot(context_.streams);
   std::uint64_t after = events.after;
   auto wait = std::chrono::milliseconds(0);
-  for (bool ended = false; !ended; wait = context_.options.heartbeat) {
+  auto next_sign = steady_clock::now();  // when the client must hear that the stream is there
+  for (bool ended = false; !ended; wait = std::min(context_.options.heartbeat, kLookForClient)) {
     const std::optional<FollowedEvents> followed = context_.service.Follow(events.job, after, wait);
-    std::string text = !followed || followed->events.empty() ? ":\n\n" : "";
+    ended = !followed || followed->ended || context_.stopping;
+    std::string text;
     for (const JobEvent& event : followed ? followed->events : std::vector<JobEvent>()) {
       text += EventText(event);
       after = event.sequence;
     }
-    if (!connection_.IsOpen() || !connection_.Write(Chunk(text))) {
+    if (text.empty() && steady_clock::now() >= next_sign) {
+      text = ":\n\n";
+    }
+    if ((connection_.HasLeft() && !context_.stopping) ||
+        (!text.empty() && !connection_.Write(Chunk(text)))) {
       return;
     }
-    ended = !followed || followed->ended || context_.stopping;
+    next_sign = text.empty() ? next_sign : steady_clock::now() + context_.options.heartbeat;
   }
   [[maybe_unused]] const bool sent = connection_.Write(Chunk(""));
 }

@@ -23,14 +23,18 @@ struct ExchangeContext {
   const std::atomic<bool>& stopping;
 };
 
+// Returns the headers of the request that decide whether it is let in.
+[[nodiscard]] AccessHeaders AccessHeadersOf(const HttpRequest& request);
+
 /// One request and its answer on one connection. Access is checked before the body is read.
 class HttpExchange {
  public:
-  HttpExchange(Connection& connection, const ExchangeContext& context);
+  // `begun` is what has been read of the request already.
+  HttpExchange(Connection& connection, const ExchangeContext& context, std::string begun);
   void Run();
 
  private:
-  // Returns nothing where the client goes, or is too slow, before its head is whole.
+  // Returns nothing where the client goes, or is told that its head is not whole.
   [[nodiscard]] std::optional<std::string> ReadHead();
   [[nodiscard]] ApiResponse Answer(const HttpRequest& request);
   [[nodiscard]] tl::expected<std::string, ApiResponse> ReadBody(const HttpRequest& request);
@@ -39,7 +43,7 @@ class HttpExchange {
 
   Connection& connection_;
   const ExchangeContext& context_;
-  std::string unread_;      // bytes that came after the head
+  std::string unread_;      // bytes that are not yet looked at
   bool head_only_ = false;  // asked with HEAD
 };
 

@@ -8,6 +8,7 @@
 #include <boost/beast/http/message.hpp>
 #include <boost/beast/http/parser.hpp>
 #include <boost/beast/http/string_body.hpp>
+#include <cctype>
 #include <charconv>
 #include <limits>
 
@@ -16,6 +17,7 @@ namespace {
 
 namespace http = boost::beast::http;
 
+constexpr std::string_view kEndOfLine = "\r\n";
 constexpr std::string_view kEndOfHead = "\r\n\r\n";
 
 boost::beast::string_view Borrowed(std::string_view text) { return {text.data(), text.size()}; }
@@ -49,6 +51,28 @@ std::string FieldLines(const std::vector<HttpField>& fields) {
   return lines;
 }
 
+bool IsNameChar(char c) {
+  return std::isalnum(static_cast<unsigned char>(c)) != 0 ||
+         std::string_view("!#$%&'*+-.^_`|~").find(c) != std::string_view::npos;
+}
+
+// Returns whether every field line is NAME:VALUE with no space before the colon (RFC 9112, 5.1).
+// Readers differ in what they take "Origin :" for, and in where a folded line belongs.
+bool HasPlainFieldLines(std::string_view head) {
+  head.remove_suffix(kEndOfHead.size());
+  for (std::size_t at = head.find(kEndOfLine); at != std::string_view::npos;) {
+    const std::string_view rest = head.substr(at + kEndOfLine.size());
+    const std::size_t next = rest.find(kEndOfLine);
+    const std::string_view line = rest.substr(0, next);
+    const std::string_view name = line.substr(0, line.find(':'));
+    if (name.empty() || name.size() == line.size() || !std::ranges::all_of(name, IsNameChar)) {
+      return false;
+    }
+    at = next == std::string_view::npos ? next : at + kEndOfLine.size() + next;
+  }
+  return true;
+}
+
 }  // namespace
 
 std::vector<std::string> HttpRequest::AllOf(std::string_view name) const {
@@ -66,12 +90,18 @@ std::optional<std::string> HttpRequest::FirstOf(std::string_view name) const {
   return values.empty() ? std::nullopt : std::optional(values.front());
 }
 
-std::optional<std::size_t> HeadSize(std::string_view bytes) {
-  const std::size_t end = bytes.find(kEndOfHead);
+std::optional<std::size_t> HeadSize(std::string_view bytes, std::size_t searched) {
+  const std::size_t from = searched - std::min(searched, kEndOfHead.size() - 1);
+  const std::size_t end = bytes.find(kEndOfHead, from);
   return end == std::string_view::npos ? std::nullopt : std::optional(end + kEndOfHead.size());
 }
 
 Result<HttpRequest> ParseRequest(std::string_view head) {
+  if (!head.ends_with(kEndOfHead) || !HasPlainFieldLines(head)) {
+    return Fail(ErrorCode::kBadData,
+                "not an HTTP request: each line of its head must be NAME: VALUE, without a space "
+                "before the colon");
+  }
   http::request_parser<http::buffer_body> parser;                  // whose body is not read here
   parser.header_limit(std::numeric_limits<std::uint32_t>::max());  // the caller has its own
   parser.body_limit(std::numeric_limits<std::uint64_t>::max());

@@ -28,12 +28,13 @@ struct HttpRequest {
 };
 
 /// Returns the number of bytes up to and including the empty line that ends a head; nothing while
-/// it is missing.
-[[nodiscard]] std::optional<std::size_t> HeadSize(std::string_view bytes);
+/// it is missing. The first `searched` bytes are known not to hold all of it.
+[[nodiscard]] std::optional<std::size_t> HeadSize(std::string_view bytes, std::size_t searched = 0);
 
 /// Parses a whole head, up to and including its empty line.
 ///
-/// Errors  kBadData: no HTTP/1.0 or 1.1 request
+/// Errors  kBadData: no HTTP/1.0 or 1.1 request; a field line that is folded, has no colon, or has
+///         a space before its colon
 [[nodiscard]] Result<HttpRequest> ParseRequest(std::string_view head);
 
 /// Returns a request as a client sends it, with Content-Length and without keep-alive.

@@ -6,7 +6,6 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <array>
 #include <atomic>
 #include <cerrno>
 #include <condition_variable>
@@ -16,28 +15,34 @@
 #include <system_error>
 #include <thread>
 #include <utility>
+#include <vector>
 
 #include "core/check.h"
 #include "scanner/daemon/http_exchange.h"
+#include "scanner/daemon/waiting_room.h"
 
 namespace sateen {
 namespace {
 
-constexpr std::chrono::seconds kGrace{1};
+// For answers that are under way when the server ends. Requests that are still being read are not
+// waited for.
+constexpr std::chrono::milliseconds kGrace{300};
+// Connections that are accepted before those in the waiting room are looked at again.
+constexpr int kAcceptAtOnce = 16;
 // When the system has no descriptors or memory left, until there are some again.
 constexpr std::chrono::milliseconds kPause{20};
 
-void RefuseBusy(int fd) {
+std::string TooManyText(int most) {
   const std::string body =
-      Refused(503, {ErrorCode::kDevice, "the daemon has too many clients; try again later"}).body;
-  const std::string answer = fmt::format(
-      "HTTP/1.1 503 Service Unavailable\r\nContent-Type: application/json\r\nContent-Length: {}\r\n"
-      "Connection: close\r\n\r\n{}",
-      body.size(), body);
-  std::array<char, 4096> unread = {};  // unread bytes would make the client lose the answer
-  [[maybe_unused]] ssize_t ignored = recv(fd, unread.data(), unread.size(), MSG_DONTWAIT);
-  ignored = send(fd, answer.data(), answer.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
-  close(fd);
+      Refused(503, {ErrorCode::kDevice,
+                    fmt::format("the daemon has too many clients: it serves {} at a time; try "
+                                "again later (lights/off is served at once)",
+                                most)})
+          .body +
+      "\n";
+  return ResponseHead(503, {{"Content-Type", "application/json"}, {"Cache-Control", "no-store"}},
+                      body.size()) +
+         body;
 }
 
 }  // namespace
@@ -55,7 +60,9 @@ class HttpServer::Impl {
                  .options = options_,
                  .streams = streams_,
                  .stopping = stopping_},
-        wake_(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
+        wake_(eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)),
+        room_(TooManyText(options.max_connections),
+              [this](std::string_view head) { return TurnsLightsOff(head); }) {
     SATEEN_CHECK(wake_ >= 0);
     acceptor_ = std::thread([this] { Accept(); });
   }
@@ -66,12 +73,9 @@ class HttpServer::Impl {
     acceptor_.join();
     {
       std::unique_lock lock(mutex_);
-      ended_.wait_for(lock, kGrace, [&] { return OpenCount() == 0; });
-      for (const Client& client : clients_) {
-        if (!client.ended) {
-          shutdown(client.fd, SHUT_RDWR);
-        }
-      }
+      ShutDown(SHUT_RD);
+      ended_.wait_for(lock, kGrace, [&] { return OpenCount(false) + OpenCount(true) == 0; });
+      ShutDown(SHUT_RDWR);
     }
     for (Client& client : clients_) {
       client.thread.join();
@@ -84,33 +88,67 @@ class HttpServer::Impl {
  private:
   struct Client {
     int fd = -1;
-    bool ended = false;  // with the mutex held
+    bool urgent = false;  // turns the lights off, in a thread that is kept for that
+    bool ended = false;   // with the mutex held
     std::thread thread;
   };
 
-  [[nodiscard]] int OpenCount() const {
-    return static_cast<int>(
-        std::count_if(clients_.begin(), clients_.end(), [](const auto& c) { return !c.ended; }));
+  // Both with the mutex held.
+  [[nodiscard]] int OpenCount(bool urgent) const {
+    return static_cast<int>(std::ranges::count_if(
+        clients_, [&](const Client& c) { return !c.ended && c.urgent == urgent; }));
   }
-
-  void Accept() {
-    std::array<pollfd, 2> entries = {
-        {{.fd = listener_.Descriptor(), .events = POLLIN}, {.fd = wake_, .events = POLLIN}}};
-    while (!stopping_) {
-      if (poll(entries.data(), entries.size(), -1) < 0 || (entries[0].revents & POLLIN) == 0) {
-        continue;
-      }
-      const int fd =
-          accept4(listener_.Descriptor(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK);
-      if (fd >= 0) {
-        Begin(fd);
-      } else if (errno != EAGAIN && errno != EINTR) {
-        std::this_thread::sleep_for(kPause);
+  void ShutDown(int how) const {
+    for (const Client& client : clients_) {
+      if (!client.ended) {
+        shutdown(client.fd, how);
       }
     }
   }
 
-  void Begin(int fd) {
+  [[nodiscard]] bool TurnsLightsOff(std::string_view head) const {
+    const Result<HttpRequest> request = ParseRequest(head);
+    return request && IsLightsOff(request->method, request->path) &&
+           !(access_ && access_->Check(AccessHeadersOf(*request)));
+  }
+
+  void Accept() {
+    while (!stopping_) {
+      std::vector<pollfd> entries = {{.fd = listener_.Descriptor(), .events = POLLIN, .revents = 0},
+                                     {.fd = wake_, .events = POLLIN, .revents = 0}};
+      room_.AppendTo(entries);
+      poll(entries.data(), entries.size(), room_.WaitMs());
+      eventfd_t ended = 0;
+      eventfd_read(wake_, &ended);
+      JoinEnded();
+      room_.Serve();
+      for (auto urgent = room_.TakeUrgent(); urgent; urgent = room_.TakeUrgent()) {
+        if (!Begin(urgent->fd, /*urgent=*/true, urgent->begun)) {
+          room_.AddUrgent(*std::move(urgent));
+          break;
+        }
+      }
+      for (int i = 0; i < kAcceptAtOnce && AcceptOne(); ++i) {
+      }
+    }
+  }
+
+  // Returns false where nobody has come.
+  bool AcceptOne() {
+    const int fd = accept4(listener_.Descriptor(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK);
+    if (fd < 0) {
+      if (errno != EAGAIN && errno != EINTR) {
+        std::this_thread::sleep_for(kPause);
+      }
+      return false;
+    }
+    if (!Begin(fd, /*urgent=*/false, "")) {
+      room_.Add(fd);
+    }
+    return true;
+  }
+
+  void JoinEnded() {
     std::list<Client> over;
     {
       const std::lock_guard lock(mutex_);
@@ -121,30 +159,35 @@ class HttpServer::Impl {
         }
         client = next;
       }
-      if (OpenCount() < options_.max_connections) {
-        Client& client = clients_.emplace_back();
-        client.fd = std::exchange(fd, -1);
-        try {
-          client.thread = std::thread([this, &client] { Serve(client); });
-        } catch (const std::system_error&) {  // no more threads
-          fd = client.fd;
-          clients_.pop_back();
-        }
-      }
-    }
-    if (fd >= 0) {
-      RefuseBusy(fd);
     }
     for (Client& client : over) {
       client.thread.join();
     }
   }
 
-  void Serve(Client& client) {
+  // Returns false where there is no thread for it; the descriptor is then still the caller's.
+  bool Begin(int fd, bool urgent, const std::string& begun) {
+    const std::lock_guard lock(mutex_);
+    if (OpenCount(urgent) >= (urgent ? options_.max_urgent : options_.max_connections)) {
+      return false;
+    }
+    Client& client = clients_.emplace_back();
+    client.fd = fd;
+    client.urgent = urgent;
+    try {
+      client.thread = std::thread([this, &client, begun] { Serve(client, begun); });
+    } catch (const std::system_error&) {  // no more threads
+      clients_.pop_back();
+      return false;
+    }
+    return true;
+  }
+
+  void Serve(Client& client, const std::string& begun) {
     const ConnectionLimits limits = {.read = options_.client_time, .write = options_.client_time};
     try {
       Connection connection(client.fd, limits);
-      HttpExchange(connection, context_).Run();
+      HttpExchange(connection, context_, begun).Run();
     } catch (const std::exception&) {
       // Out of memory or threads: this client goes without an answer, the daemon stays.
     }
@@ -152,6 +195,7 @@ class HttpServer::Impl {
     close(client.fd);
     client.ended = true;
     ended_.notify_all();
+    eventfd_write(wake_, 1);
   }
 
   Listener listener_;
@@ -164,6 +208,7 @@ class HttpServer::Impl {
   std::mutex mutex_;  // for the clients
   std::condition_variable ended_;
   std::list<Client> clients_;
+  WaitingRoom room_;  // used by the acceptor alone
   std::thread acceptor_;
 };
 

@@ -21,6 +21,7 @@ struct HttpServerOptions {
   std::chrono::milliseconds heartbeat{5000};
   std::size_t max_body_bytes = std::size_t{64} * 1024;
   int max_connections = 64;  // each has a thread; the next one is told 503
+  int max_urgent = 4;        // threads beside them that only turn the lights off
   int max_streams = 16;      // connections among them that follow events
 };
 
@@ -30,6 +31,9 @@ struct HttpServerOptions {
 /// 400 no HTTP or no valid Content-Length, 401, 403, 421 (AccessRules), 408 too slow, 411 a body
 /// without Content-Length, 413 too long a body, 414 too long a path, 415 a body that is no
 /// application/json, 503 too many clients; everything else is the Api's answer.
+///
+/// A client that turns the lights off is served whatever the others do: a connection for which
+/// there is no thread is asked first what it wants (WaitingRoom).
 class HttpServer {
  public:
   // Lets in everybody who can connect if there is no `access`. `api` and `service` must outlive the
@@ -38,7 +42,8 @@ class HttpServer {
              std::optional<AccessRules> access, const HttpServerOptions& options = {});
   HttpServer(const HttpServer&) = delete;
   HttpServer& operator=(const HttpServer&) = delete;
-  // Takes no more connections, gives those that are open a second to end, and ends them.
+  // Takes no more connections and reads no more of those that are open, gives answers that are
+  // under way a moment, and ends them.
   ~HttpServer();
 
   [[nodiscard]] const Listener& GetListener() const;

@@ -13,6 +13,11 @@
 
 namespace sateen {
 
+// Returns whether the client that waits for something has left; empty where there is no client.
+using ClientLeft = std::function<bool()>;
+// How often a wait looks whether its client has left.
+inline constexpr std::chrono::milliseconds kLookForClient{100};
+
 // Event of a job. Events are in order, and a job ends with one "done" or one "failed".
 struct JobEvent {
   std::uint64_t sequence = 0;  // from 1, without gaps

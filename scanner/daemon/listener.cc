@@ -41,6 +41,17 @@ Status InUse(const std::filesystem::path& path) {
               path.string(), path.string());
 }
 
+// Fails unless the lock is a regular file of this user.
+Status CheckLock(int fd, const std::filesystem::path& path) {
+  struct stat file = {};
+  const bool ours = fstat(fd, &file) == 0 && S_ISREG(file.st_mode) && file.st_uid == geteuid();
+  return ours ? Status{}
+              : Fail(ErrorCode::kIo,
+                     "{}.lock: is not a regular file of this user; remove it, or name a socket "
+                     "elsewhere: --socket",
+                     path.string());
+}
+
 // Makes room for the socket: nothing is there, or what a daemon left that was killed.
 Status RemoveStale(const std::filesystem::path& path, sockaddr_un& address) {
   struct stat there = {};
@@ -106,7 +117,9 @@ Result<Listener> Listener::OnUnixSocket(const std::filesystem::path& path) {
   }
   std::memcpy(address.sun_path, path.c_str(), path.native().size() + 1);
   Listener listener;
-  listener.lock_ = open((path.native() + ".lock").c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0600);
+  // A link in its place could make this create, or lock, a file of somebody else.
+  listener.lock_ = open((path.native() + ".lock").c_str(),
+                        O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK, 0600);
   if (listener.lock_ < 0) {
     const int reason = errno;
     return Fail(
@@ -115,10 +128,14 @@ Result<Listener> Listener::OnUnixSocket(const std::filesystem::path& path) {
             ? fmt::format("; make the folder first: mkdir -p {}, or name a socket elsewhere: "
                           "--socket",
                           path.parent_path().string())
-            : "; name a socket elsewhere: --socket");
+        : reason == ELOOP ? "; it is a link: remove it, or name a socket elsewhere: --socket"
+                          : "; name a socket elsewhere: --socket");
   }
-  Status status =
-      flock(listener.lock_, LOCK_EX | LOCK_NB) == 0 ? RemoveStale(path, address) : InUse(path);
+  Status status = CheckLock(listener.lock_, path);
+  if (status) {
+    status =
+        flock(listener.lock_, LOCK_EX | LOCK_NB) == 0 ? RemoveStale(path, address) : InUse(path);
+  }
   if (!status) {
     return tl::unexpected(status.error());
   }

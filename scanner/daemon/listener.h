@@ -12,7 +12,7 @@ class Listener {
  public:
   /// Listens on a Unix socket to which only its owner, and root, may connect: the file is made with
   /// mode 0600. A file `path`.lock is locked for as long as this lives, so that one of two daemons
-  /// that start at once wins. The socket that a killed daemon left is replaced.
+  /// that start at once wins; it must be a regular file of this user, and no link. The socket that a killed daemon left is replaced.
   ///
   /// Errors  kDevice: a daemon has this socket; kIo: something else is there, or the system
   ///         refuses; kInvalidArgument: longer than the system's 107 bytes

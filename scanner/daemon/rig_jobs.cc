@@ -44,7 +44,8 @@ Result<std::string> DoBoard(const BoardChange& change, JobContext& job) {
 }
 
 Result<std::string> DoLightsOff(JobContext& job) {
-  const Result<LightBoard*> board = job.Devices().Board();
+  // A port that is gone is told at once; after the job it is waited for.
+  const Result<LightBoard*> board = job.Devices().Board(std::chrono::milliseconds(0));
   if (!board) {
     return tl::unexpected(board.error());
   }

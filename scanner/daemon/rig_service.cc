@@ -1,10 +1,16 @@
 #include "scanner/daemon/rig_service.h"
 
 #include <algorithm>
+#include <atomic>
+#include <condition_variable>
+#include <deque>
 #include <exception>
+#include <mutex>
+#include <thread>
 #include <utility>
 
 #include "core/check.h"
+#include "core/stray_thread.h"
 #include "scanner/daemon/answer_json.h"
 
 namespace sateen {
@@ -15,10 +21,81 @@ constexpr std::ptrdiff_t kEndedJobsKept = 20;
 
 }  // namespace
 
-class RigService::Context : public JobContext {
+class RigService::Impl {
  public:
-  Context(RigService& service, Job& job)
-      : service_(service), job_(job), task_{.cancel = &job.cancel} {}
+  Impl(std::unique_ptr<RigDevices> devices, std::chrono::milliseconds desk_grace)
+      : devices_(std::move(devices)), desk_grace_(desk_grace) {}
+
+  void StartThreads(const std::shared_ptr<Impl>& self) {
+    rig_.thread = std::thread([this] { RunJobs(rig_); });
+    StartStray([self] { self->RunJobs(self->desk_); });
+  }
+
+  tl::expected<std::uint64_t, JobRefusal> Begin(JobRequest request);
+  tl::expected<JobRecord, JobRefusal> RunToEnd(JobRequest request, const ClientLeft& left);
+  RigState State() const;
+  std::vector<JobRecord> Jobs() const;
+  std::optional<JobRecord> Find(std::uint64_t id) const;
+  std::optional<FollowedEvents> Follow(std::uint64_t id, std::uint64_t after,
+                                       std::chrono::milliseconds longest) const;
+  bool Cancel(std::uint64_t id, const std::string& who);
+  bool WaitIdle(std::chrono::milliseconds longest) const;
+  JobWait AwaitEnd(std::uint64_t id, std::chrono::milliseconds longest) const;
+  void Stop();
+
+ private:
+  struct Job {
+    JobRecord record;
+    JobWork work;
+    std::deque<JobEvent> events;
+    std::atomic<bool> cancel = false;
+    std::string cancelled_by;
+  };
+  class Context;
+  // Runs one job at a time.
+  struct Lane {
+    Job* running = nullptr;
+    bool over = false;   // it runs no more jobs
+    std::thread thread;  // the rig's; the desk's is a stray one
+  };
+
+  [[nodiscard]] Lane& LaneOf(const JobRecord& job) { return job.has_rig ? rig_ : desk_; }
+  void RunJobs(Lane& lane);
+  [[nodiscard]] Result<std::string> Work(Job& job);
+  // The board's answer to all off.
+  struct LightsWord {
+    std::string fault;         // why it has not confirmed; empty: it has, or has never answered
+    bool contradicts = false;  // whether it answers, and says something else
+    std::vector<int> lit;      // channels that it says are on
+  };
+  [[nodiscard]] LightsWord ConfirmLightsOff();
+  [[nodiscard]] LightsWord TryLightsOff(std::chrono::milliseconds port_wait);
+  void NoteRig(LightsWord lights);                            // with the mutex held
+  void End(Job& job, Result<std::string> result);             // with the mutex held
+  void ForgetOldJobs();                                       // with the mutex held
+  void Append(Job& job, std::string type, std::string data);  // with the mutex held
+  [[nodiscard]] Job* Known(std::uint64_t id) const;           // with the mutex held
+
+  std::unique_ptr<RigDevices> devices_;  // used by the rig's thread alone
+  const std::chrono::milliseconds desk_grace_;
+
+  mutable std::mutex mutex_;  // for all below
+  mutable std::condition_variable changed_;
+  std::deque<std::unique_ptr<Job>> jobs_;  // the latest last
+  std::uint64_t next_id_ = 1;
+  std::optional<KnownBoard> board_;
+  std::optional<CameraInfo> camera_;
+  std::vector<int> lit_;
+  std::string lights_fault_;
+  bool board_lost_ = false;  // the job that ends waits for a board that does not answer
+  bool stopping_ = false;
+  Lane rig_;
+  Lane desk_;  // lane of jobs without devices
+};
+
+class RigService::Impl::Context : public JobContext {
+ public:
+  Context(Impl& service, Job& job) : service_(service), job_(job), task_{.cancel = &job.cancel} {}
   RigDevices& Devices() override {
     SATEEN_CHECK(job_.record.has_rig);
     return *service_.devices_;
@@ -34,19 +111,12 @@ class RigService::Context : public JobContext {
   }
 
  private:
-  RigService& service_;
+  Impl& service_;
   Job& job_;
   Task task_;
 };
 
-RigService::RigService(std::unique_ptr<RigDevices> devices) : devices_(std::move(devices)) {
-  rig_.thread = std::thread([this] { RunJobs(rig_); });
-  desk_.thread = std::thread([this] { RunJobs(desk_); });
-}
-
-RigService::~RigService() { Stop(); }
-
-tl::expected<std::uint64_t, JobRefusal> RigService::Begin(JobRequest request) {
+tl::expected<std::uint64_t, JobRefusal> RigService::Impl::Begin(JobRequest request) {
   const std::lock_guard lock(mutex_);
   if (stopping_) {
     return tl::unexpected<JobRefusal>(
@@ -73,23 +143,31 @@ tl::expected<std::uint64_t, JobRefusal> RigService::Begin(JobRequest request) {
   return lane.running->record.id;
 }
 
-tl::expected<JobRecord, JobRefusal> RigService::RunToEnd(JobRequest request) {
+tl::expected<JobRecord, JobRefusal> RigService::Impl::RunToEnd(JobRequest request,
+                                                               const ClientLeft& left) {
   const tl::expected<std::uint64_t, JobRefusal> id = Begin(std::move(request));
   if (!id) {
     return tl::unexpected(id.error());
   }
   std::unique_lock lock(mutex_);
   std::optional<JobRecord> record;
-  changed_.wait(lock, [&] {
+  const auto has_ended = [&] {
     const Job* job = Known(*id);
     // Gone only when 20 others have ended since.
     record = job == nullptr ? JobRecord{.id = *id, .state = JobState::kDone} : job->record;
     return record->state != JobState::kRunning;
-  });
+  };
+  while (!changed_.wait_for(lock, kLookForClient, has_ended)) {
+    if (left && left()) {
+      lock.unlock();
+      Cancel(*id, record->owner + ", who has left");
+      break;
+    }
+  }
   return *std::move(record);
 }
 
-RigState RigService::State() const {
+RigState RigService::Impl::State() const {
   const std::lock_guard lock(mutex_);
   RigState state = {.board = board_, .camera = camera_, .lit = lit_, .lights_fault = lights_fault_};
   if (rig_.running != nullptr) {
@@ -103,7 +181,7 @@ RigState RigService::State() const {
   return state;
 }
 
-std::vector<JobRecord> RigService::Jobs() const {
+std::vector<JobRecord> RigService::Impl::Jobs() const {
   const std::lock_guard lock(mutex_);
   std::vector<JobRecord> records;
   for (const auto& job : jobs_) {
@@ -112,14 +190,14 @@ std::vector<JobRecord> RigService::Jobs() const {
   return records;
 }
 
-std::optional<JobRecord> RigService::Find(std::uint64_t id) const {
+std::optional<JobRecord> RigService::Impl::Find(std::uint64_t id) const {
   const std::lock_guard lock(mutex_);
   const Job* job = Known(id);
   return job == nullptr ? std::nullopt : std::optional(job->record);
 }
 
-std::optional<FollowedEvents> RigService::Follow(std::uint64_t id, std::uint64_t after,
-                                                 std::chrono::milliseconds longest) const {
+std::optional<FollowedEvents> RigService::Impl::Follow(std::uint64_t id, std::uint64_t after,
+                                                       std::chrono::milliseconds longest) const {
   std::unique_lock lock(mutex_);
   changed_.wait_for(lock, longest, [&] {
     const Job* job = Known(id);
@@ -136,7 +214,7 @@ std::optional<FollowedEvents> RigService::Follow(std::uint64_t id, std::uint64_t
   return followed;
 }
 
-bool RigService::Cancel(std::uint64_t id, const std::string& who) {
+bool RigService::Impl::Cancel(std::uint64_t id, const std::string& who) {
   const std::lock_guard lock(mutex_);
   Job* job = Known(id);
   if (job == nullptr) {
@@ -149,12 +227,22 @@ bool RigService::Cancel(std::uint64_t id, const std::string& who) {
   return true;
 }
 
-bool RigService::WaitIdle(std::chrono::milliseconds longest) const {
+bool RigService::Impl::WaitIdle(std::chrono::milliseconds longest) const {
   std::unique_lock lock(mutex_);
   return changed_.wait_for(lock, longest, [&] { return rig_.running == nullptr; });
 }
 
-void RigService::Stop() {
+JobWait RigService::Impl::AwaitEnd(std::uint64_t id, std::chrono::milliseconds longest) const {
+  std::unique_lock lock(mutex_);
+  const auto is_running = [&] {
+    const Job* job = Known(id);
+    return job != nullptr && job->record.state == JobState::kRunning;
+  };
+  changed_.wait_for(lock, longest, [&] { return !is_running() || board_lost_; });
+  return !is_running() ? JobWait::kEnded : board_lost_ ? JobWait::kBoardLost : JobWait::kRunning;
+}
+
+void RigService::Impl::Stop() {
   {
     const std::lock_guard lock(mutex_);
     if (stopping_) {
@@ -170,11 +258,16 @@ void RigService::Stop() {
     changed_.notify_all();
   }
   rig_.thread.join();
-  desk_.thread.join();
+  std::unique_lock lock(mutex_);
+  const bool over = changed_.wait_for(lock, desk_grace_, [&] { return desk_.over; });
+  if (!over && desk_.running != nullptr) {
+    End(*desk_.running, Fail(ErrorCode::kCancelled, "the job did not end; it was left behind"));
+  }
+  lock.unlock();
   devices_->Release();
 }
 
-void RigService::RunJobs(Lane& lane) {
+void RigService::Impl::RunJobs(Lane& lane) {
   while (true) {
     Job* job = nullptr;
     {
@@ -183,6 +276,9 @@ void RigService::RunJobs(Lane& lane) {
       job = lane.running;
     }
     if (job == nullptr) {
+      const std::lock_guard lock(mutex_);
+      lane.over = true;
+      changed_.notify_all();
       return;
     }
     Result<std::string> result = Work(*job);
@@ -196,11 +292,13 @@ void RigService::RunJobs(Lane& lane) {
     if (has_rig) {
       NoteRig(std::move(lights));
     }
-    End(*job, std::move(result));
+    if (job->record.state == JobState::kRunning) {  // not left behind
+      End(*job, std::move(result));
+    }
   }
 }
 
-Result<std::string> RigService::Work(Job& job) {
+Result<std::string> RigService::Impl::Work(Job& job) {
   Context context(*this, job);
   // Nothing that a job does may end the daemon, or leave its lights on.
   try {
@@ -211,42 +309,53 @@ Result<std::string> RigService::Work(Job& job) {
   }
 }
 
-RigService::LightsWord RigService::ConfirmLightsOff() {
-  LightsWord lights;
-  for (int tries = 0; tries < 2; ++tries) {
-    const Result<LightBoard*> board = devices_->Board();
-    if (!board && !devices_->BoardHasAnswered()) {
-      return {};  // nothing of this daemon's can be on
-    }
-    if (!board) {
-      lights = {.fault = board.error().message};
-      continue;
-    }
-    const Result<BoardState> off = (*board)->AllOff();
-    if (off) {
-      const BoardInfo& info = (*board)->Info();
-      const std::lock_guard lock(mutex_);
-      board_ = {.port = (*board)->PortName(),
-                .firmware = info.build_id,
-                .protocol = info.protocol,
-                .lights = static_cast<int>(info.lights.size())};
-      return {};
-    }
-    lights = {.fault = off.error().message,
-              .contradicts = (*board)->state() == LightBoard::State::kReady};
-    if (const std::optional<BoardState>& said = (*board)->LastSaid()) {
-      lights.lit = LitChannels(said->lit);
-    }
+RigService::Impl::LightsWord RigService::Impl::ConfirmLightsOff() {
+  LightsWord lights = TryLightsOff(std::chrono::milliseconds(0));
+  if (lights.fault.empty()) {
+    return lights;
   }
-  lights.fault =
+  {
+    // Who waits for the lights to be off is told now, and not when the port has been waited for.
+    const std::lock_guard lock(mutex_);
+    lights_fault_ = lights.fault;
+    board_lost_ = !lights.contradicts;
+    changed_.notify_all();
+  }
+  return TryLightsOff(kUntilGreetingTimeout);  // longer than the board's 2 s of silence
+}
+
+RigService::Impl::LightsWord RigService::Impl::TryLightsOff(std::chrono::milliseconds port_wait) {
+  const std::string unconfirmed =
       "the board did not confirm that all lights are off; it turns them off by itself when it "
-      "hears nothing for 2 s: " +
-      lights.fault;
+      "hears nothing for 2 s: ";
+  const Result<LightBoard*> board = devices_->Board(port_wait);
+  if (!board && !devices_->BoardHasAnswered()) {
+    return {};  // nothing of this daemon's can be on
+  }
+  if (!board) {
+    return {.fault = unconfirmed + board.error().message};
+  }
+  const Result<BoardState> off = (*board)->AllOff();
+  if (off) {
+    const BoardInfo& info = (*board)->Info();
+    const std::lock_guard lock(mutex_);
+    board_ = {.port = (*board)->PortName(),
+              .firmware = info.build_id,
+              .protocol = info.protocol,
+              .lights = static_cast<int>(info.lights.size())};
+    return {};
+  }
+  LightsWord lights = {.fault = unconfirmed + off.error().message,
+                       .contradicts = (*board)->state() == LightBoard::State::kReady};
+  if (const std::optional<BoardState>& said = (*board)->LastSaid()) {
+    lights.lit = LitChannels(said->lit);
+  }
   return lights;
 }
 
-void RigService::NoteRig(LightsWord lights) {
+void RigService::Impl::NoteRig(LightsWord lights) {
   lit_ = std::move(lights.lit);
+  board_lost_ = false;
   lights_fault_ = std::move(lights.fault);
   camera_ = devices_->OpenCamera();
   if (!lights_fault_.empty()) {
@@ -254,7 +363,7 @@ void RigService::NoteRig(LightsWord lights) {
   }
 }
 
-void RigService::End(Job& job, Result<std::string> result) {
+void RigService::Impl::End(Job& job, Result<std::string> result) {
   JobRecord& record = job.record;
   record.ended = std::chrono::system_clock::now();
   if (result) {
@@ -273,14 +382,14 @@ void RigService::End(Job& job, Result<std::string> result) {
   changed_.notify_all();
 }
 
-void RigService::ForgetOldJobs() {
+void RigService::Impl::ForgetOldJobs() {
   const auto has_ended = [](const auto& job) { return job->record.state != JobState::kRunning; };
   for (auto ended = std::ranges::count_if(jobs_, has_ended); ended > kEndedJobsKept; --ended) {
     jobs_.erase(std::ranges::find_if(jobs_, has_ended));
   }
 }
 
-void RigService::Append(Job& job, std::string type, std::string data) {
+void RigService::Impl::Append(Job& job, std::string type, std::string data) {
   job.events.push_back(
       {.sequence = ++job.record.last_event, .type = std::move(type), .data = std::move(data)});
   if (job.events.size() > kEventsKept) {
@@ -289,9 +398,48 @@ void RigService::Append(Job& job, std::string type, std::string data) {
   changed_.notify_all();
 }
 
-RigService::Job* RigService::Known(std::uint64_t id) const {
+RigService::Impl::Job* RigService::Impl::Known(std::uint64_t id) const {
   const auto job = std::ranges::find_if(jobs_, [&](const auto& j) { return j->record.id == id; });
   return job == jobs_.end() ? nullptr : job->get();
 }
+
+RigService::RigService(std::unique_ptr<RigDevices> devices, std::chrono::milliseconds desk_grace)
+    : impl_(std::make_shared<Impl>(std::move(devices), desk_grace)) {
+  impl_->StartThreads(impl_);
+}
+
+RigService::~RigService() { Stop(); }
+
+tl::expected<std::uint64_t, JobRefusal> RigService::Begin(JobRequest request) {
+  return impl_->Begin(std::move(request));
+}
+
+tl::expected<JobRecord, JobRefusal> RigService::RunToEnd(JobRequest request,
+                                                         const ClientLeft& left) {
+  return impl_->RunToEnd(std::move(request), left);
+}
+
+RigState RigService::State() const { return impl_->State(); }
+
+std::vector<JobRecord> RigService::Jobs() const { return impl_->Jobs(); }
+
+std::optional<JobRecord> RigService::Find(std::uint64_t id) const { return impl_->Find(id); }
+
+std::optional<FollowedEvents> RigService::Follow(std::uint64_t id, std::uint64_t after,
+                                                 std::chrono::milliseconds longest) const {
+  return impl_->Follow(id, after, longest);
+}
+
+bool RigService::Cancel(std::uint64_t id, const std::string& who) { return impl_->Cancel(id, who); }
+
+bool RigService::WaitIdle(std::chrono::milliseconds longest) const {
+  return impl_->WaitIdle(longest);
+}
+
+JobWait RigService::AwaitEnd(std::uint64_t id, std::chrono::milliseconds longest) const {
+  return impl_->AwaitEnd(id, longest);
+}
+
+void RigService::Stop() { impl_->Stop(); }
 
 }  // namespace sateen

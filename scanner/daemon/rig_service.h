@@ -1,14 +1,10 @@
 #pragma once
 
-#include <atomic>
 #include <chrono>
-#include <condition_variable>
-#include <deque>
+#include <cstdint>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include "core/error.h"
@@ -43,6 +39,12 @@ struct RigState {
   std::string lights_fault;  // why the board's word that all is off is missing; else empty
 };
 
+enum class JobWait {
+  kEnded,
+  kBoardLost,  // the job's lights are to be off, and the board does not confirm it so far
+  kRunning,
+};
+
 struct FollowedEvents {
   std::vector<JobEvent> events;
   bool ended = false;  // no more will come
@@ -54,12 +56,13 @@ struct FollowedEvents {
 ///     idle       Begin: the job's work runs                                    -> running
 ///     running    the work returns, throws, or was cancelled and returns        -> ending
 ///     ending     the board has said that all lights are off, or cannot be
-///                reached twice, which takes longer than its 2 s of silence     -> idle
+///                reached for longer than its 2 s of silence                    -> idle
 ///
 /// A job counts as running until its lights are off, so that no light is ever on while the state
 /// says that no job runs. Where the board answers, and does not say that all is off, the job has
-/// failed, whatever it did, and State() names the lights. Begin while a job runs is refused at once: the error names who has the
-/// rig and since when. There is no queue. All calls may come from any thread.
+/// failed, whatever it did, and State() names the lights. Begin while a job runs is refused at once:
+/// the error names who has the rig and since when. There is no queue. All calls may come from any
+/// thread.
 ///
 /// A job that needs no devices, as a solve, runs in a thread of its own beside the job that has the
 /// rig: neither waits for the other. There is one such job at a time.
@@ -67,15 +70,19 @@ struct FollowedEvents {
 /// The latest 1000 events of each job are kept, and the latest 20 ended jobs.
 class RigService {
  public:
-  explicit RigService(std::unique_ptr<RigDevices> devices);
+  // `desk_grace`: how long Stop() waits for a job without devices.
+  explicit RigService(std::unique_ptr<RigDevices> devices,
+                      std::chrono::milliseconds desk_grace = std::chrono::seconds(5));
   RigService(const RigService&) = delete;
   RigService& operator=(const RigService&) = delete;
   ~RigService();  // Stop()
 
   // Begins a job and returns its number.
   [[nodiscard]] tl::expected<std::uint64_t, JobRefusal> Begin(JobRequest request);
-  // Begins a job and waits for its end.
-  [[nodiscard]] tl::expected<JobRecord, JobRefusal> RunToEnd(JobRequest request);
+  // Begins a job and waits for its end. Cancels it when the client has left, and then returns it as
+  // it is.
+  [[nodiscard]] tl::expected<JobRecord, JobRefusal> RunToEnd(JobRequest request,
+                                                             const ClientLeft& left = {});
 
   [[nodiscard]] RigState State() const;
   [[nodiscard]] std::vector<JobRecord> Jobs() const;
@@ -91,54 +98,18 @@ class RigService {
   // Waits until no job has the rig; false where one still does after `longest`.
   bool WaitIdle(std::chrono::milliseconds longest) const;
 
+  // Waits until the job has ended, until it turns out that the board does not answer, or until
+  // `longest` has passed.
+  [[nodiscard]] JobWait AwaitEnd(std::uint64_t id, std::chrono::milliseconds longest) const;
+
   // Refuses new jobs, cancels the running ones, waits for their end, turns all lights off and
-  // closes the devices. The second time it does nothing.
+  // closes the devices. The second time it does nothing. A job without devices that does not end
+  // in time, as one that reads from a disk that has gone, is left to a stray thread.
   void Stop();
 
  private:
-  struct Job {
-    JobRecord record;
-    JobWork work;
-    std::deque<JobEvent> events;
-    std::atomic<bool> cancel = false;
-    std::string cancelled_by;
-  };
-  class Context;
-  // Runs one job at a time.
-  struct Lane {
-    Job* running = nullptr;
-    std::thread thread;
-  };
-
-  [[nodiscard]] Lane& LaneOf(const JobRecord& job) { return job.has_rig ? rig_ : desk_; }
-  void RunJobs(Lane& lane);
-  [[nodiscard]] Result<std::string> Work(Job& job);
-  // The board's answer to all off.
-  struct LightsWord {
-    std::string fault;         // why it has not confirmed; empty: it has
-    bool contradicts = false;  // whether it answers, and says something else
-    std::vector<int> lit;      // channels that it says are on
-  };
-  [[nodiscard]] LightsWord ConfirmLightsOff();
-  void NoteRig(LightsWord lights);                            // with the mutex held
-  void End(Job& job, Result<std::string> result);             // with the mutex held
-  void ForgetOldJobs();                                       // with the mutex held
-  void Append(Job& job, std::string type, std::string data);  // with the mutex held
-  [[nodiscard]] Job* Known(std::uint64_t id) const;           // with the mutex held
-
-  std::unique_ptr<RigDevices> devices_;  // used by the rig's thread alone
-
-  mutable std::mutex mutex_;  // for all below
-  mutable std::condition_variable changed_;
-  std::deque<std::unique_ptr<Job>> jobs_;  // the latest last
-  std::uint64_t next_id_ = 1;
-  std::optional<KnownBoard> board_;
-  std::optional<CameraInfo> camera_;
-  std::vector<int> lit_;
-  std::string lights_fault_;
-  bool stopping_ = false;
-  Lane rig_;
-  Lane desk_;  // lane of jobs without devices
+  class Impl;
+  std::shared_ptr<Impl> impl_;  // shared with the thread of jobs without devices
 };
 
 }  // namespace sateen

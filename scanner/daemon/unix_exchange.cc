@@ -110,7 +110,12 @@ tl::expected<int, ExchangeFault> ExchangeOnUnixSocket(
   while (!request.empty()) {
     const ssize_t count = send(client.Get(), request.data(), request.size(), MSG_NOSIGNAL);
     if (count < 0 && errno != EINTR) {
-      return Fault(false, LastError());
+      // A server that refuses answers before it has read the whole request.
+      const bool may_have_answered = errno == EPIPE || errno == ECONNRESET;
+      const std::string why = LastError();
+      const auto answer = may_have_answered ? ReadAnswer(client, patience, take)
+                                            : tl::expected<int, ExchangeFault>(Fault(false, why));
+      return answer ? answer : Fault(false, why);
     }
     request.remove_prefix(static_cast<std::size_t>(std::max<ssize_t>(count, 0)));
   }

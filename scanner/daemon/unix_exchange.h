@@ -21,7 +21,8 @@ struct ExchangePatience {
 };
 
 /// Sends one HTTP request to the server on a Unix socket and gives the pieces of the answer's body,
-/// with its status, to `take` as they come. Returns the status.
+/// with its status, to `take` as they come. Returns the status. A server that closes its end before
+/// it has read the request may have answered: that answer counts.
 [[nodiscard]] tl::expected<int, ExchangeFault> ExchangeOnUnixSocket(
     const std::filesystem::path& socket, std::string_view request, const ExchangePatience& patience,
     const std::function<void(int status, std::string_view piece)>& take);

@@ -227,8 +227,9 @@ Result<SateenGreeting> BoardLink::Greet(BytePort::Duration deadline) {
       port_->Name(), options_.greeting_timeout.count());
 }
 
-Result<SateenGreeting> BoardLink::Connect() {
-  const BytePort::Duration deadline = port_->Now() + options_.greeting_timeout;
+Result<SateenGreeting> BoardLink::Connect(milliseconds port_wait) {
+  const BytePort::Duration begun = port_->Now();
+  const BytePort::Duration deadline = begun + options_.greeting_timeout;
   const bool was_closed = state_ == State::kClosed;
   Result<SateenGreeting> greeting =
       Fail(ErrorCode::kTimeout, "{}: greeting_timeout is too short", port_->Name());
@@ -236,7 +237,7 @@ Result<SateenGreeting> BoardLink::Connect() {
     if (!open_) {
       if (const Status opened = port_->Open(); !opened) {
         greeting = tl::unexpected(opened.error());
-        if (was_closed) {
+        if (was_closed || port_->Now() - begun >= port_wait) {
           break;
         }
         port_->Wait(kOpenInterval);

@@ -46,8 +46,9 @@ class BoardLink {
   [[nodiscard]] LightBoard::State state() const { return state_; }
   [[nodiscard]] BytePort& port() { return *port_; }
 
-  // Opens the port where it is not open, says hello until the board greets.
-  [[nodiscard]] Result<SateenGreeting> Connect();
+  // Opens the port where it is not open, says hello until the board greets. Waits at most
+  // `port_wait` for a port that is not there.
+  [[nodiscard]] Result<SateenGreeting> Connect(std::chrono::milliseconds port_wait);
   void Close() noexcept;
 
   // Sends the command until its answer comes, whatever that says; `Answer` is what the table says

@@ -196,11 +196,11 @@ const BoardInfo& LightBoard::Info() const { return info_; }
 
 const std::optional<BoardState>& LightBoard::LastSaid() const { return last_said_; }
 
-Status LightBoard::Connect() {
+Status LightBoard::Connect(milliseconds port_wait) {
   if (!options_status_) {
     return options_status_;
   }
-  const Result<SateenGreeting> greeting = link_->Connect();
+  const Result<SateenGreeting> greeting = link_->Connect(port_wait);
   if (!greeting) {
     return tl::unexpected(greeting.error());
   }

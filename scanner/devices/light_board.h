@@ -84,6 +84,9 @@ struct LightBoardOptions {
   [[nodiscard]] Status Validate() const;
 };
 
+// Longest wait for a port that is not there, where only LightBoardOptions::greeting_timeout ends it.
+inline constexpr std::chrono::milliseconds kUntilGreetingTimeout{86'400'000};
+
 /// The LED board at the end of a serial port. One owner, move-only, one thread at a time.
 ///
 ///     state        legal                what leads out of it
@@ -135,9 +138,9 @@ class LightBoard {
   [[nodiscard]] const std::optional<BoardState>& LastSaid() const;
 
   // Tries until the board has greeted or greeting_timeout has passed. From kClosed a port that is
-  // not there is an error at once; from other states it is waited for, since it may be plugged in
-  // again.
-  [[nodiscard]] Status Connect();
+  // not there is an error at once; from other states it is waited for, at most for `port_wait`,
+  // since it may be plugged in again.
+  [[nodiscard]] Status Connect(std::chrono::milliseconds port_wait = kUntilGreetingTimeout);
   // Sends all off where the state is kReady, without waiting for the answer.
   void Close() noexcept;
   // Returns the time of the port's clock.

@@ -14,12 +14,12 @@ RigDevices::RigDevices(std::unique_ptr<BytePort> port, std::unique_ptr<TetheredC
 
 RigDevices::~RigDevices() { Release(); }
 
-Result<LightBoard*> RigDevices::Board() {
+Result<LightBoard*> RigDevices::Board(std::chrono::milliseconds port_wait) {
   if (!board_) {
     board_.emplace(MakeSerialPort(names_.port));
   }
   if (board_->state() != LightBoard::State::kReady) {
-    if (const Status connected = board_->Connect(); !connected) {
+    if (const Status connected = board_->Connect(port_wait); !connected) {
       return tl::unexpected(connected.error());
     }
   }

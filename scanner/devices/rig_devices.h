@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -30,9 +31,10 @@ class RigDevices {
   RigDevices& operator=(const RigDevices&) = delete;
   ~RigDevices();
 
-  // Returns the connected board; what was lost is connected anew. kDevice: none, or it does not
-  // answer.
-  [[nodiscard]] Result<LightBoard*> Board();
+  // Returns the connected board; what was lost is connected anew, and its port waited for at most
+  // `port_wait`. kDevice: none, or it does not answer.
+  [[nodiscard]] Result<LightBoard*> Board(
+      std::chrono::milliseconds port_wait = kUntilGreetingTimeout);
   // Returns whether a board has ever answered: then a light of it may be on.
   [[nodiscard]] bool BoardHasAnswered() const { return board_has_answered_; }
   // Returns the open camera; what was lost is opened anew. kDevice: none, or it cannot be used, and

@@ -13,6 +13,7 @@
 #include "scanner/daemon/http_client.h"
 #include "tests/cli/cli_runner.h"
 #include "tests/scanner/daemon/daemon_fakes.h"
+#include "tests/scanner/daemon/hostile_clients.h"
 #include "tests/testing/files.h"
 
 namespace sateen::serve_test {
@@ -70,6 +71,13 @@ RunResult Light(std::vector<std::string> words) {
   return testing::RunCommand<cli::LightArgs>(std::move(words), cli::AddLight, cli::RunLight);
 }
 
+RunResult Serve(std::vector<std::string> words) {
+  words.insert(words.begin(), "serve");
+  std::atomic<bool> cancel = true;
+  return testing::RunCommand<cli::ServeArgs>(std::move(words), cli::AddServe, cli::RunServe,
+                                             {.cancel = &cancel});
+}
+
 TEST(Serve, SaysWhereItListensAndEndsWithNothingLeft) {
   Serving daemon;
   EXPECT_TRUE(std::filesystem::exists(daemon.Socket()));
@@ -106,18 +114,50 @@ TEST(Serve, DevicesAreTheDaemons) {
   EXPECT_THAT(devices.out, HasSubstr("LED board, firmware fakefake"));
 }
 
+// All connections are taken: what turns the lights off is served, everything else is told why not.
+TEST(Serve, CommandsOfAFullDaemonSayWhatHappened) {
+  const Serving daemon;
+  const testing::Crowd crowd = testing::Attack(testing::HostileKinds(1)[1], daemon.Socket(), 64);
+  const RunResult off = Light({"off"});
+  EXPECT_EQ(off.exit_status, 0) << off.log;
+  EXPECT_EQ(off.out, "all lights off\n");
+  const RunResult devices =
+      testing::RunCommand<cli::DevicesArgs>({"devices"}, cli::AddDevices, cli::RunDevices);
+  EXPECT_EQ(devices.exit_status, 5);
+  EXPECT_THAT(devices.log, HasSubstr("sateen devices: error: the daemon has too many clients"));
+  const RunResult light = Light({"3", "--for", "900ms"});
+  EXPECT_EQ(light.exit_status, 5);
+  EXPECT_THAT(light.log, HasSubstr("the daemon has too many clients"));
+}
+
+TEST(Serve, ALockThatIsNoFileOfOursIsRefused) {
+  const TempFolder folder;
+  const std::filesystem::path socket = folder.Path() / "s.sock";
+  const std::filesystem::path lock = folder.Path() / "s.sock.lock";
+  const std::filesystem::path other = folder.Path() / "other";
+  testing::WriteText(other, "mine");
+  for (const std::filesystem::path& target : {other, folder.Path() / "none", lock}) {
+    std::filesystem::create_symlink(target, lock);
+    const RunResult refused = Serve({"--socket", socket.string()});
+    EXPECT_EQ(refused.exit_status, 4) << target;
+    EXPECT_THAT(refused.log, HasSubstr("s.sock.lock"));
+    EXPECT_THAT(refused.log, HasSubstr("it is a link")) << target;
+    std::filesystem::remove(lock);
+  }
+  EXPECT_FALSE(std::filesystem::exists(folder.Path() / "none"));
+  ASSERT_EQ(mkfifo(lock.c_str(), 0600), 0);
+  const RunResult fifo = Serve({"--socket", socket.string()});
+  EXPECT_EQ(fifo.exit_status, 4);
+  EXPECT_THAT(fifo.log, HasSubstr("is not a regular file of this user"));
+  std::filesystem::remove(lock);
+  EXPECT_EQ(Serve({"--socket", socket.string()}).exit_status, 0);
+}
+
 TEST(Serve, APortThatIsNamedIsOpenedByTheCommandItself) {
   const Serving daemon;
   const RunResult named = Light({"status", "--port", "/nowhere/ttyACM7"});
   EXPECT_EQ(named.exit_status, 5);
   EXPECT_THAT(named.log, HasSubstr("/nowhere/ttyACM7"));
-}
-
-RunResult Serve(std::vector<std::string> words) {
-  words.insert(words.begin(), "serve");
-  std::atomic<bool> cancel = true;
-  return testing::RunCommand<cli::ServeArgs>(std::move(words), cli::AddServe, cli::RunServe,
-                                             {.cancel = &cancel});
 }
 
 TEST(Serve, TcpNeedsATokenFileOfModeSixHundred) {

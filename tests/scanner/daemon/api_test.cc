@@ -141,6 +141,57 @@ TEST(Api, BoardIsAskedAndChanged) {
   EXPECT_EQ(BoardFromJson(changed.body)->info.settings.max_lit, 2);
 }
 
+TEST(Api, AChannelThatTheBoardHasNotChangesNothing) {
+  FakeDaemon daemon;
+  for (const int channel : {-1, 14, 99}) {
+    for (const BoardChange& change :
+         {BoardChange{.channel = channel},
+          BoardChange{.clear_fault = true, .channel = channel, .max_level = 0.5},
+          BoardChange{.channel = channel, .max_on = milliseconds(100), .max_lit = 2}}) {
+      const ApiResponse refused = daemon.Ask("POST", "/v1/board", BoardChangeToJson(change, "bob"));
+      EXPECT_EQ(refused.status, 400) << refused.body;
+      EXPECT_THAT(Message(refused), HasSubstr("the board has lights 0 to 13"));
+    }
+  }
+  EXPECT_EQ(daemon.Ask("POST", "/v1/board", R"({"channel":13})").status, 200);
+  EXPECT_EQ(daemon.rig.board.executed[SATEEN_LIMIT_LIGHT], 0);
+  EXPECT_EQ(daemon.rig.board.executed[SATEEN_CONFIGURE], 0);
+  EXPECT_EQ(daemon.rig.board.executed[SATEEN_CLEAR_FAULT], 0);
+}
+
+// The board's own time-out turns them off; who asks is told so at once, and not after the 3 s for
+// which the daemon waits for the port.
+TEST(Api, LightsOffWithTheBoardUnpluggedSaysSoBeforeThePortIsWaitedFor) {
+  FakeDaemon daemon;
+  const std::uint64_t light =
+      *daemon.service.Begin(testing::WorkJob([&](JobContext& job) -> Result<std::string> {
+        EXPECT_TRUE((*job.Devices().Board())->SetLight(3, 0.5, std::chrono::seconds(10)));
+        daemon.rig.board.Unplug();  // the port's clock stands still: it is waited for without end
+        while (!job.GetTask().Cancelled()) {
+          std::this_thread::yield();
+        }
+        return Fail(ErrorCode::kDevice, "lost");
+      }));
+  for (int k = 0; k < 2; ++k) {
+    const ApiResponse off = daemon.Ask("POST", "/v1/lights/off");
+    EXPECT_EQ(off.status, 503) << off.body;
+    EXPECT_THAT(Message(off), HasSubstr("it turns them off by itself"));
+    EXPECT_EQ(daemon.service.Find(light)->state, JobState::kRunning);
+  }
+  EXPECT_THAT(daemon.service.State().lights_fault, HasSubstr("did not confirm"));
+  daemon.rig.held = false;
+  ASSERT_TRUE(daemon.service.WaitIdle(testing::kLong));
+  // Also where it was lost before.
+  daemon.rig.held = true;
+  EXPECT_EQ(daemon.Ask("POST", "/v1/lights/off").status, 503);
+  daemon.rig.held = false;
+  ASSERT_TRUE(daemon.service.WaitIdle(testing::kLong));
+  daemon.rig.board.Replug();
+  daemon.rig.board.plugged = true;
+  EXPECT_EQ(daemon.Ask("POST", "/v1/lights/off").status, 200);
+  EXPECT_EQ(daemon.service.State().lights_fault, "");
+}
+
 TEST(Api, DevicesAreTheDaemonsOwn) {
   FakeDaemon daemon;
   const ApiResponse answer = daemon.Ask("GET", "/v1/devices");

@@ -10,6 +10,7 @@
 #include <optional>
 #include <thread>
 
+#include "scanner/daemon/answer_json.h"
 #include "scanner/daemon/event_parser.h"
 #include "scanner/daemon/http_server.h"
 #include "tests/scanner/daemon/daemon_fakes.h"
@@ -158,11 +159,18 @@ TEST_F(DaemonClientTest, ADaemonThatGoesAwayIsToldOf) {
   daemon_.service.Stop();
 }
 
+// Waits for a client: the listener itself does not block.
+int AcceptOn(const Listener& listener) {
+  pollfd waiting = {.fd = listener.Descriptor(), .events = POLLIN};
+  EXPECT_EQ(poll(&waiting, 1, 60'000), 1);
+  return accept(listener.Descriptor(), nullptr, nullptr);
+}
+
 // Killed between the question and its answer.
 TEST_F(DaemonClientTest, ADaemonThatDiesWhileItIsAskedIsGone) {
   std::optional<Listener> listener(*Listener::OnUnixSocket(Socket()));
   std::thread daemon([&] {
-    const int connection = accept(listener->Descriptor(), nullptr, nullptr);
+    const int connection = AcceptOn(*listener);
     pollfd asked = {.fd = connection, .events = POLLIN};
     EXPECT_EQ(poll(&asked, 1, 60'000), 1);
     listener.reset();
@@ -173,6 +181,40 @@ TEST_F(DaemonClientTest, ADaemonThatDiesWhileItIsAskedIsGone) {
   ASSERT_FALSE(answer);
   EXPECT_EQ(answer.error().code, ErrorCode::kDevice);
   EXPECT_THAT(answer.error().message, HasSubstr("is gone"));
+}
+
+// A server that is full answers before it has read the request, and closes its end.
+TEST_F(DaemonClientTest, AnAnswerThatComesBeforeTheRequestIsReadCounts) {
+  const Listener listener = *Listener::OnUnixSocket(Socket());
+  std::thread daemon([&] {
+    const int connection = AcceptOn(listener);
+    const std::string body = ErrorJson({ErrorCode::kDevice, "too many"});
+    const std::string answer =
+        fmt::format("HTTP/1.1 503 Busy\r\nContent-Length: {}\r\n\r\n{}", body.size(), body);
+    EXPECT_EQ(write(connection, answer.data(), answer.size()), static_cast<ssize_t>(answer.size()));
+    shutdown(connection, SHUT_RD);  // from now on the client gets EPIPE
+    pollfd gone = {.fd = connection, .events = 0};
+    EXPECT_EQ(poll(&gone, 1, 60'000), 1);
+    close(connection);
+  });
+  const Result<std::string> answer = client_.Ask("POST", "/v1/jobs", std::string(4'000'000, ' '));
+  daemon.join();
+  ASSERT_FALSE(answer);
+  EXPECT_EQ(answer.error().message, "too many");
+}
+
+// Nobody would watch its light any more.
+TEST_F(DaemonClientTest, AJobThatCannotBeFollowedIsCancelled) {
+  Result<Listener> listener = Listener::OnUnixSocket(Socket());
+  ASSERT_TRUE(listener);
+  server_ = std::make_unique<HttpServer>(*std::move(listener), daemon_.api, daemon_.service,
+                                         std::nullopt, HttpServerOptions{.max_streams = 0});
+  const Result<bool> refused =
+      KeepLightOnByDaemon(client_, {.channel = 3, .level = 0.5}, {}, [](const LightOn&) {});
+  ASSERT_FALSE(refused);
+  EXPECT_THAT(refused.error().message, HasSubstr("too many clients follow events"));
+  ASSERT_TRUE(daemon_.service.WaitIdle(kLong));
+  EXPECT_THAT(daemon_.rig.board.lit, IsEmpty());
 }
 
 TEST(EventParser, TakesEventsOutOfAnyPieces) {

@@ -92,7 +92,17 @@ TEST_F(HttpServerTest, RefusesWhatItCannotRead) {
             400},
            {HttpRequest("POST", "/v1/jobs", "", host + "Transfer-Encoding: chunked\r\n"), 411},
            {HttpRequest("POST", "/v1/lights/3", "", host + "Content-Length: 2\r\n") + "{}", 415},
-           {HttpRequest("GET", "/v1/jobs/1/events", "", host + "Last-Event-ID: x\r\n"), 400}}) {
+           {HttpRequest("GET", "/v1/jobs/1/events", "", host + "Last-Event-ID: x\r\n"), 400},
+           // Lines that readers take for different things (RFC 9112, 5.1 and 5.2).
+           {HttpRequest("POST", "/v1/jobs", "", host + "Transfer-Encoding : chunked\r\n"), 400},
+           {HttpRequest("POST", "/v1/jobs", "", host + "Transfer-Encoding\t: chunked\r\n"), 400},
+           {HttpRequest("POST", "/v1/jobs", "", host + "Transfer-Encoding:\r\n"), 411},
+           {HttpRequest("GET", "/v1/state", "", host + "Origin : x\r\n"), 400},
+           {HttpRequest("GET", "/v1/state", "", host + " Origin: x\r\n"), 400},
+           {HttpRequest("GET", "/v1/state", "", host + "X: a\r\n Origin: x\r\n"), 400},
+           {HttpRequest("GET", "/v1/state", "", host + ": x\r\n"), 400},
+           {HttpRequest("GET", "/v1/state", "", " Host: localhost\r\n"), 400},
+           {HttpRequest("GET", "/v1/state", "", "X!#$%&'*+-.^_`|~9:\r\n"), 200}}) {
     const std::string answer = Exchange(Socket(), bytes);
     EXPECT_EQ(StatusOf(answer), status) << bytes.substr(0, 100) << "\n" << answer;
     if (status != 200) {
@@ -145,8 +155,39 @@ TEST_F(HttpServerTest, SlowClientsAreGivenUpAndHoldNobodyUp) {
   EXPECT_EQ(StatusOf(Ask("GET", "/v1/state")), 200);
   for (int i = 0; i < 20; ++i) {
     const std::string answer = slow[static_cast<std::size_t>(i)]->Read();  // to its end
-    EXPECT_EQ(StatusOf(answer), i % 2 == 0 ? 0 : 408) << answer;
+    EXPECT_EQ(StatusOf(answer), 408) << answer;
+    EXPECT_TRUE(json::accept(BodyOf(answer))) << answer;
   }
+}
+
+// One that ends its request too early is told so, and one that sent nothing is not waited for.
+TEST_F(HttpServerTest, RequestsThatEndTooEarlyAre400) {
+  ServeUnix({.client_time = testing::kLong});
+  for (const std::string bytes :
+       {"GET /v1/st", "GET /v1/state HTTP/1.1\r\n",
+        "POST /v1/jobs HTTP/1.1\r\nContent-Type: application/json\r\nContent-Length: 5\r\n\r\n{"}) {
+    RawClient client(Socket());
+    client.Send(bytes);
+    client.EndSending();
+    const std::string answer = client.Read();
+    EXPECT_EQ(StatusOf(answer), 400) << bytes << answer;
+    EXPECT_TRUE(json::accept(BodyOf(answer))) << answer;
+  }
+  RawClient silent(Socket());
+  silent.EndSending();
+  EXPECT_EQ(silent.Read(), "");
+  RawClient whole(Socket());
+  whole.Send(HttpRequest("POST", "/v1/lights/off"));
+  whole.EndSending();
+  EXPECT_EQ(StatusOf(whole.Read()), 200);
+}
+
+// What turns the lights off is not kept waiting for a body that it does not need.
+TEST_F(HttpServerTest, LightsOffNeedsNoBody) {
+  ServeUnix({.client_time = testing::kLong});
+  RawClient client(Socket());
+  client.Send("POST /v1/lights/off HTTP/1.1\r\nContent-Length: 60000\r\n\r\n");
+  EXPECT_EQ(StatusOf(client.Read("}")), 200);
 }
 
 TEST_F(HttpServerTest, MoreConnectionsThanItsThreadsAreToldSo) {
@@ -183,6 +224,10 @@ TEST_F(HttpServerTest, OnTcpOnlyWithTheTokenAndOurHost) {
   EXPECT_EQ(StatusOf(ask("Host: evil.example\r\n" + token)), 421);
   EXPECT_EQ(StatusOf(ask(host + "Host: evil.example\r\n" + token)), 421);
   EXPECT_EQ(StatusOf(ask(host + token + "Origin: https://evil.example\r\n")), 403);
+  EXPECT_EQ(StatusOf(ask(host + token + "Origin:\r\n")), 403);
+  EXPECT_EQ(StatusOf(ask(host + token + "Origin: \r\n")), 403);
+  EXPECT_EQ(StatusOf(ask(host + token + "oRIGIN:null\r\n")), 403);
+  EXPECT_EQ(StatusOf(ask(host + token + "Origin : https://evil.example\r\n")), 400);
   // Before its body is read: what is refused learns nothing.
   EXPECT_EQ(StatusOf(ask(host, std::string(100'000, ' '))), 401);
   EXPECT_EQ(StatusOf(Exchange(port, HttpRequest("GET", "/v1/nothing", "", host))), 401);

@@ -48,6 +48,8 @@ class RawClient {
     }
     return true;
   }
+  // Says that nothing more will be sent; answers can still be read.
+  void EndSending() const { shutdown(fd_, SHUT_WR); }
   // Reads until `until` has come or the other end closes; gives up after a minute.
   std::string Read(const std::string& until = std::string()) {
     while (until.empty() || text_.find(until) == std::string::npos) {
