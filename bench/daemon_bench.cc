@@ -1,40 +1,105 @@
-// The daemon under random API calls, right and wrong, with the real firmware in simulated time. The
-// bar: --rate 200 --seconds 60 under the address sanitizer.
+// The daemon with the real firmware in simulated time: under random API calls, right and wrong (the
+// bar: --rate 200 --seconds 60 under the address sanitizer); under hostile clients (--hostile: turning
+// the lights off takes 1 s at most); over a day (--sessions 2000: what it uses does not grow).
 #include <fmt/format.h>
-#include <sys/resource.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <chrono>
 #include <filesystem>
-#include <fstream>
 #include <string>
 #include <thread>
 #include <vector>
 
 #include "core/interrupt.h"
-#include "tests/simulation/virtual_rig/daemon_stress.h"
+#include "tests/scanner/daemon/hostile_clients.h"
+#include "tests/simulation/virtual_rig/daemon_day.h"
 
 namespace {
 
+using sateen::testing::DaemonDay;
+using sateen::testing::HostileKind;
 using sateen::testing::StressClient;
 using sateen::testing::StressCounts;
 using sateen::testing::StressedDaemon;
+using sateen::testing::Usage;
 using std::chrono::steady_clock;
 
-// Kilobytes of memory, and open descriptors, of this program.
-std::pair<long, long> Used() {
-  std::ifstream status("/proc/self/status");
-  long kb = 0;
-  for (std::string word; status >> word;) {
-    if (word == "VmRSS:") {
-      status >> kb;
+void Print(const std::string& when, const Usage& usage) {
+  fmt::print("{:<20} {:.1f} MB, {} descriptors, {} threads, {} scratch files\n", when,
+             static_cast<double>(usage.memory_kb) / 1024.0, usage.descriptors, usage.threads,
+             usage.scratch_files);
+  std::fflush(stdout);
+}
+
+// Turns the lights off under 70 clients of each kind, while a capture runs.
+int RunHostile() {
+  constexpr int kClients = 70;
+  constexpr double kBar_s = 1.0;
+  double longest_s = 0.0;
+  int refused = 0;
+  const std::size_t kinds = sateen::testing::HostileKinds(1).size();
+  for (std::size_t k = 0; k < kinds && !sateen::InterruptFlag(); ++k) {
+    StressedDaemon daemon({});
+    const auto ask = [&](const std::string& method, const std::string& path,
+                         const std::string& body = "") {
+      return sateen::testing::TimedExchange(daemon.socket,
+                                            sateen::testing::HttpRequest(method, path, body));
+    };
+    ask("POST", "/v1/lights/3", R"({"level": 0.5})");
+    const HostileKind kind = sateen::testing::HostileKinds(1)[k];
+    const auto crowd = sateen::testing::Attack(kind, daemon.socket, kClients);
+    const auto off = ask("POST", "/v1/lights/off");
+    const auto state = ask("GET", "/v1/state");
+    const int status = sateen::testing::StatusOf(off.text);
+    const bool whole = sateen::testing::IsWholeAnswer(state.text);
+    const auto start = steady_clock::now();
+    daemon.service.Stop();
+    daemon.servers.clear();
+    const double end_s = std::chrono::duration<double>(steady_clock::now() - start).count();
+    fmt::print(
+        "{:<24} lights/off {} after {:.3f} s; another client {} after {:.3f} s{}; ended in "
+        "{:.3f} s\n",
+        kind.name, status, off.time.count(), sateen::testing::StatusOf(state.text),
+        state.time.count(), whole ? "" : " WITHOUT A BODY", end_s);
+    std::fflush(stdout);
+    longest_s = std::max({longest_s, off.time.count(), end_s});
+    refused += status == 200 && whole ? 0 : 1;
+  }
+  const bool good = refused == 0 && longest_s <= kBar_s;
+  fmt::print("longest {:.3f} s, bar {} s: {}\n", longest_s, kBar_s, good ? "met" : "NOT MET");
+  return good ? 0 : 3;
+}
+
+// What it uses after a tenth of the sessions, and at least five, and at the end.
+int RunDay(int sessions) {
+  StressedDaemon daemon({});
+  DaemonDay day(daemon);
+  Usage early;
+  int wrong = 0;
+  const auto start = steady_clock::now();
+  for (int session = 1; session <= sessions && !sateen::InterruptFlag(); ++session) {
+    for (const std::string& what : day.LiveOneSession()) {
+      fmt::print("session {}: {}\n", session, what);
+      ++wrong;
+    }
+    if (session == std::max(sessions / 10, 5)) {
+      early = sateen::testing::UsageNow();
+    }
+    if (session % std::max(sessions / 10, 1) == 0) {
+      Print(fmt::format("after {} sessions", session), sateen::testing::UsageNow());
     }
   }
-  long descriptors = 0;
-  for ([[maybe_unused]] const auto& entry : std::filesystem::directory_iterator("/proc/self/fd")) {
-    ++descriptors;
-  }
-  return {kb, descriptors};
+  const Usage late = sateen::testing::UsageNow();
+  const double took_s = std::chrono::duration<double>(steady_clock::now() - start).count();
+  // Allocators keep some for good; 2 KB of each session would show.
+  const bool good = wrong == 0 && late.descriptors <= early.descriptors + 2 &&
+                    late.threads <= early.threads + 2 &&
+                    late.scratch_files == early.scratch_files &&
+                    late.memory_kb <= early.memory_kb + 4096;
+  fmt::print("{} sessions in {:.0f} s, {} answers wrong: {}\n", sessions, took_s, wrong,
+             good ? "met" : "NOT MET");
+  return good ? 0 : 3;
 }
 
 // Calls at even times until the end; one that is late is made at once.
@@ -98,13 +163,23 @@ int main(int argc, char** argv) {
   int clients_count = 8;
   std::uint64_t seed = 1;
   bool captures = true;
+  bool hostile = false;
+  int sessions = 0;
   app.add_option("--seconds", seconds, "How long")->capture_default_str();
   app.add_option("--rate", rate, "Calls a second, of all clients")->capture_default_str();
   app.add_option("--clients", clients_count, "Threads that call")->capture_default_str();
   app.add_option("--seed", seed, "Of the calls")->capture_default_str();
   app.add_flag("!--no-captures", captures, "Without captures among the jobs");
+  app.add_flag("--hostile", hostile, "Hostile clients of each kind instead");
+  app.add_option("--sessions", sessions, "So many sessions one after the other instead");
   CLI11_PARSE(app, argc, argv);
   sateen::InstallInterruptHandlers();
+  if (hostile) {
+    return RunHostile();
+  }
+  if (sessions > 0) {
+    return RunDay(sessions);
+  }
   StressedDaemon daemon({.client_time = std::chrono::milliseconds(2000),
                          .heartbeat = std::chrono::milliseconds(500)});
   std::vector<StressClient> clients;
@@ -123,10 +198,7 @@ int main(int argc, char** argv) {
   }
   for (const double part : {0.1, 0.4, 0.7, 1.0}) {
     std::this_thread::sleep_until(after(part));
-    const auto [kb, descriptors] = Used();
-    fmt::print("after {:>3.0f} %          {} MB, {} descriptors\n", 100 * part, kb / 1024,
-               descriptors);
-    std::fflush(stdout);
+    Print(fmt::format("after {:>3.0f} %", 100 * part), sateen::testing::UsageNow());
   }
   for (std::thread& thread : threads) {
     thread.join();

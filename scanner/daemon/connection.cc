@@ -19,9 +19,8 @@ namespace {
 using std::chrono::milliseconds;
 using std::chrono::steady_clock;
 
-// How much, and for how long, is read of a client that is being refused.
+// How much is read of a client that is being refused.
 constexpr std::size_t kDrainBytes = 1'048'576;
-constexpr milliseconds kDrainTime{500};
 
 std::string UserName(uid_t uid) {
   std::vector<char> buffer(16384);
@@ -59,7 +58,7 @@ Connection::Connection(int fd, const ConnectionLimits& limits)
 Connection::~Connection() {
   // A socket that is closed with something unread in it takes the answer away from the client.
   shutdown(fd_, SHUT_WR);
-  const auto until = steady_clock::now() + kDrainTime;
+  const auto until = steady_clock::now() + limits_.drain;
   for (std::size_t drained = 0; drained < kDrainBytes;) {
     const auto left = std::chrono::duration_cast<milliseconds>(until - steady_clock::now());
     const bool waited = left.count() > 0 && WaitFor(POLLIN, left);

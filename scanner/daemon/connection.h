@@ -13,6 +13,8 @@ struct ConnectionLimits {
   // not take.
   std::chrono::milliseconds read{10'000};
   std::chrono::milliseconds write{10'000};
+  // After the answer: how long the client is read that still sends.
+  std::chrono::milliseconds drain{500};
   // Request line, headers and body together.
   std::size_t request_bytes = std::size_t{128} * 1024;
 };

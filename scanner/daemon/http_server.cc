@@ -27,6 +27,8 @@ namespace {
 // For answers that are under way when the server ends. Requests that are still being read are not
 // waited for.
 constexpr std::chrono::milliseconds kGrace{300};
+// How long a client that turned the lights off keeps others from it: its request has been read.
+constexpr std::chrono::milliseconds kUrgentDrain{20};
 // Connections that are accepted before those in the waiting room are looked at again.
 constexpr int kAcceptAtOnce = 16;
 // When the system has no descriptors or memory left, until there are some again.
@@ -184,7 +186,10 @@ class HttpServer::Impl {
   }
 
   void Serve(Client& client, const std::string& begun) {
-    const ConnectionLimits limits = {.read = options_.client_time, .write = options_.client_time};
+    ConnectionLimits limits = {.read = options_.client_time, .write = options_.client_time};
+    if (client.urgent) {
+      limits.drain = kUrgentDrain;
+    }
     try {
       Connection connection(client.fd, limits);
       HttpExchange(connection, context_, begun).Run();

@@ -28,15 +28,15 @@ inline std::vector<HostileKind> HostileKinds(std::uint64_t running_job) {
   const auto send = [](std::string bytes) {
     return [bytes = std::move(bytes)](const RawClient& client) { client.Send(bytes); };
   };
-  const std::string json = "Content-Type: application/json\r\n";
+  const std::string is_json = "Content-Type: application/json\r\n";
   return {
       {.name = "silent", .act = send(""), .stays = true},
       {.name = "slow head", .act = send("GET /v1/st"), .stays = true},
       {.name = "slow body",
-       .act = send("POST /v1/jobs HTTP/1.1\r\n" + json + "Content-Length: 5\r\n\r\n{"),
+       .act = send("POST /v1/jobs HTTP/1.1\r\n" + is_json + "Content-Length: 5\r\n\r\n{"),
        .stays = true},
       {.name = "slow body of lights/off",
-       .act = send("POST /v1/lights/off HTTP/1.1\r\n" + json + "Content-Length: 5\r\n\r\n{")},
+       .act = send("POST /v1/lights/off HTTP/1.1\r\n" + is_json + "Content-Length: 5\r\n\r\n{")},
       {.name = "half closed",
        .act =
            [](const RawClient& client) {

@@ -1,9 +1,8 @@
-#include "tests/simulation/virtual_rig/daemon_stress.h"
-
 #include <gmock/gmock.h>
 
 #include "scanner/capture/session_proof.h"
 #include "scanner/daemon/rig_jobs.h"
+#include "tests/simulation/virtual_rig/daemon_day.h"
 
 namespace sateen::testing::daemon_stress_test {
 namespace {
@@ -37,6 +36,24 @@ TEST(DaemonStress, NoLightWithoutAJobWhateverTheClientsDo) {
   EXPECT_GT(daemon.witness.TimesOn(), 0);
   EXPECT_EQ(daemon.witness.Two(), 0);
   EXPECT_EQ(daemon.witness.WithoutJob(), 0);
+}
+
+// bench/daemon_bench.cc does 2,000, and prints the memory too, of which a sanitizer keeps more.
+TEST(DaemonDay, UsesNoMoreAfterManySessionsThanAfterAFew) {
+  StressedDaemon daemon({});
+  DaemonDay day(daemon);
+  const auto live = [&](int sessions) {
+    for (int k = 0; k < sessions; ++k) {
+      EXPECT_THAT(day.LiveOneSession(/*solve=*/k % 5 == 0), IsEmpty());
+    }
+    return UsageNow();
+  };
+  const Usage early = live(10);
+  const Usage late = live(20);
+  EXPECT_LE(late.descriptors, early.descriptors + 2);  // the last connections may still be there
+  EXPECT_LE(late.threads, early.threads + 2);
+  EXPECT_EQ(late.scratch_files, early.scratch_files);
+  EXPECT_EQ(EntriesOf(daemon.folder.Path()), 3);  // rig, socket and its lock
 }
 
 TEST(Daemon, ACaptureByTheApiIsWholeAndTellsHowFarItIs) {
