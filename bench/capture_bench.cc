@@ -17,7 +17,7 @@
 #include <vector>
 
 #include "core/file_io.h"
-#include "core/scratch_folder.h"
+#include "core/own_folder.h"
 #include "scanner/capture/capture_request.h"
 
 namespace {
@@ -380,12 +380,15 @@ int main(int argc, char** argv) {
   if (repeat_host > 0) {
     return RepeatHost(rig, folder, repeat_host);
   }
-  const sateen::ScratchFolder scratch("capture-bench");
+  const sateen::Result<sateen::OwnFolder> scratch = sateen::MakeScratchFolder("capture-bench");
+  if (!scratch) {
+    std::cerr << "capture_bench: error: " << scratch.error().message << '\n';
+    return 4;
+  }
   const fs::path source = SATEEN_SOURCE_DIR;
-  CaptureBench bench(scratch.Path());
-  if (!scratch.Create() ||
-      !bench.Render((source / "samples/scenes/twill-table.json").string(), "small")) {
-    std::cerr << "capture_bench: error: cannot render into " << scratch.Path() << '\n';
+  CaptureBench bench(scratch->Path());
+  if (!bench.Render((source / "samples/scenes/twill-table.json").string(), "small")) {
+    std::cerr << "capture_bench: error: cannot render into " << scratch->Path() << '\n';
     return 4;
   }
   const auto wanted = [&](const char* name) { return only.empty() || only == name; };
@@ -396,7 +399,7 @@ int main(int argc, char** argv) {
     MeasureFaults(bench, full ? 1 : 13);
   }
   if (wanted("repeat")) {
-    MeasureRepeats(bench, fs::canonical("/proc/self/exe"), scratch.Path(), full ? 100 : 5);
+    MeasureRepeats(bench, fs::canonical("/proc/self/exe"), scratch->Path(), full ? 100 : 5);
   }
   if (wanted("speed")) {
     MeasureSpeed(bench, source, full ? 5 : 1);

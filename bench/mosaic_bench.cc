@@ -20,7 +20,7 @@
 #include "core/file_io.h"
 #include "core/output_folder.h"
 #include "core/parallel.h"
-#include "core/scratch_folder.h"
+#include "core/own_folder.h"
 #include "core/sha256.h"
 #include "imaging/dng.h"
 #include "imaging/raw.h"
@@ -375,12 +375,12 @@ int main(int argc, char** argv) {
     MeasureInMemory(size, 3);
   }
   if (only != "memory") {
-    const sateen::ScratchFolder scratch("mosaic-bench");
-    if (folder.empty() && !scratch.Create()) {
-      fmt::print(stderr, "mosaic_bench: error: cannot write into {}\n", scratch.Path().string());
+    const sateen::Result<sateen::OwnFolder> scratch = sateen::MakeScratchFolder("mosaic-bench");
+    if (!scratch) {
+      fmt::print(stderr, "mosaic_bench: error: {}\n", scratch.error().message);
       return 4;
     }
-    const fs::path place = folder.empty() ? scratch.Path() : fs::path(folder);
+    const fs::path place = folder.empty() ? scratch->Path() : fs::path(folder);
     const Run run = MeasureFiles(size, place, 3);
     MeasureLarge(full ? kHundredFiftyMegapixels : kSixteenMegapixels, run, size, place);
   }

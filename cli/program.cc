@@ -27,6 +27,7 @@
 #include "cli/session_verify.h"
 #include "cli/simulate.h"
 #include "cli/solve.h"
+#include "core/notice.h"
 #include "core/printable.h"
 #include "core/version.h"
 
@@ -92,6 +93,10 @@ int RunProgram(int argc, const char* const* argv, const Task& task, std::ostream
   } catch (const CLI::ParseError& error) {
     return app.exit(error, out, log) == 0 ? 0 : kUsage;
   }
+  const NoticesTo log_notices([&](const std::string& text) {
+    task.ClearProgress();
+    log << "sateen: note: " << text << '\n';
+  });
   const int status = table.RunTyped(task, out, log);
   if (status == 0 && !out.flush()) {
     log << "sateen: error: standard output cannot be written; is the disk full, or its reader "

@@ -38,6 +38,23 @@ tl::unexpected<Error> CannotWrite(const std::filesystem::path& path, int error_n
 
 std::string SystemReason(int error_number) { return std::generic_category().message(error_number); }
 
+std::string FolderAdvice(int error_number) {
+  switch (error_number) {
+    case EACCES:
+    case EPERM:
+      return "; get write permission or choose another folder";
+    case EROFS:
+      return "; choose a folder on a disk that can be written to";
+    case ENOSPC:
+    case EDQUOT:
+      return "; free some space or choose another disk";
+    case ENOENT:
+      return "; create the folder first";
+    default:
+      return "; choose another folder";
+  }
+}
+
 Status WriteBytes(const std::filesystem::path& path, const std::string& bytes,
                   const std::filesystem::path& shown) {
   FileDescriptor file(path, O_WRONLY | O_CREAT | O_TRUNC);

@@ -28,4 +28,7 @@ namespace sateen {
 // Returns the system's words for an errno.
 [[nodiscard]] std::string SystemReason(int error_number);
 
+// Returns what to do about an errno of creating something in a folder, to end a message with.
+[[nodiscard]] std::string FolderAdvice(int error_number);
+
 }  // namespace sateen

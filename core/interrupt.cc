@@ -15,7 +15,7 @@ void SetFlag(int /*signal*/) { interrupted = true; }
 }  // namespace
 
 void InstallInterruptHandlers() {
-  for (const int signal : {SIGINT, SIGTERM}) {
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
     struct sigaction action = {};
     SATEEN_CHECK(sigaction(signal, nullptr, &action) == 0);
     if (action.sa_handler == SIG_IGN) {  // nohup, or a shell's background job

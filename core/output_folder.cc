@@ -8,55 +8,18 @@
 #include <utility>
 
 #include "core/check.h"
+#include "core/file_exchange.h"
+#include "core/notice.h"
 
 namespace sateen {
 namespace {
 
 namespace fs = std::filesystem;
 
+constexpr std::string_view kStaging = ".sateen-";
+
 fs::path ParentOf(const fs::path& path) {
   return path.has_parent_path() ? path.parent_path() : fs::path(".");
-}
-
-Status FlushFolders(const std::vector<fs::path>& folders) {
-  for (const fs::path& folder : folders) {
-    // A folder may be written to and yet not be read; then it cannot be flushed either.
-    if (access(folder.c_str(), R_OK) != 0) {
-      continue;
-    }
-    if (Status flushed = FlushToDisk(folder, folder); !flushed) {
-      return flushed;
-    }
-  }
-  return {};
-}
-
-std::string Advice(int error_number) {
-  switch (error_number) {
-    case EACCES:
-    case EPERM:
-      return "; get write permission or choose another folder";
-    case EROFS:
-      return "; choose a folder on a disk that can be written to";
-    case ENOSPC:
-    case EDQUOT:
-      return "; free some space or choose another disk";
-    case ENOENT:
-      return "; create the folder first";
-    default:
-      return "; choose another folder";
-  }
-}
-
-// Makes a new, empty, hidden folder in `dir`, so on the same file system.
-Result<fs::path> MakeStagingDir(const fs::path& dir) {
-  std::string name = (dir / ".sateen-XXXXXX").string();
-  if (mkdtemp(name.data()) == nullptr) {
-    const int error_number = errno;
-    return Fail(ErrorCode::kIo, "{}: cannot write to this folder: {}{}", dir.string(),
-                SystemReason(error_number), Advice(error_number));
-  }
-  return fs::path(name);
 }
 
 // Makes the missing folders on the way to `dir` and appends them to `created`.
@@ -78,63 +41,55 @@ Status MakeFolders(const fs::path& dir, std::vector<fs::path>& created) {
                   folder.string());
     }
     return Fail(ErrorCode::kIo, "{}: cannot create or enter this folder: {}{}", folder.string(),
-                SystemReason(error_number), Advice(error_number));
+                SystemReason(error_number), FolderAdvice(error_number));
   }
   return {};
 }
 
-// Renames that can be taken back as long as none of them is final.
-class Moves {
- public:
-  Status Move(const fs::path& from, const fs::path& to, const fs::path& shown) {
-    if (rename(from.c_str(), to.c_str()) != 0) {
-      return Fail(ErrorCode::kIo, "{}: cannot put in place: {}", shown.string(),
-                  SystemReason(errno));
-    }
-    done_.emplace_back(from, to);
-    return {};
-  }
-  [[nodiscard]] bool TakeBack() {
-    bool all = true;
-    for (; !done_.empty(); done_.pop_back()) {
-      all &= rename(done_.back().second.c_str(), done_.back().first.c_str()) == 0;
-    }
-    return all;
-  }
-
- private:
-  std::vector<std::pair<fs::path, fs::path>> done_;
-};
-
-// Moves old files to `aside`, the last name (the record) first; then the new ones in, the record
-// last, so that at no moment it stands beside files that it does not describe.
-Status PutInPlace(const fs::path& from, const fs::path& to, const std::vector<std::string>& names,
-                  const std::vector<std::string>& retired, const std::vector<fs::path>& folders,
-                  Moves& moves) {
-  const fs::path aside = from / ".replaced";
-  std::vector<std::string> old = retired;
-  old.insert(old.end(), names.begin(), names.end());
-  for (auto name = old.rbegin(); name != old.rend(); ++name) {
-    std::error_code ignored;  // Move() will fail and say so
-    if (fs::symlink_status(to / *name, ignored).type() == fs::file_type::not_found) {
+// Fails where a former run's file could not be replaced as one: a folder, or what a link leads to.
+Status CheckPlace(const fs::path& dir, const std::string& name) {
+  fs::path place = dir;
+  const fs::path relative(name);
+  for (auto part = relative.begin(); part != relative.end(); ++part) {
+    place /= *part;
+    const bool is_file = std::next(part) == relative.end();
+    std::error_code ignored;
+    const fs::file_type type = fs::symlink_status(place, ignored).type();
+    if (type == fs::file_type::not_found || (is_file && type == fs::file_type::regular) ||
+        (!is_file && type == fs::file_type::directory)) {
       continue;
     }
-    fs::create_directories((aside / *name).parent_path(), ignored);
-    if (Status moved = moves.Move(to / *name, aside / *name, to / *name); !moved) {
-      return moved;
+    return Fail(ErrorCode::kIo, "{}: is {} where a {} must go; move it away", place.string(),
+                type == fs::file_type::directory ? "a folder"
+                : type == fs::file_type::symlink ? "a link"
+                : type == fs::file_type::regular ? "a file"
+                                                 : "a device or a pipe",
+                is_file ? "file" : "folder");
+  }
+  return {};
+}
+
+// Puts back what lies in staging folders of runs that were killed, and removes these. Says so.
+void CleanUp(const fs::path& dir) {
+  for (OwnFolder& left : OwnFolder::Abandoned(dir, kStaging)) {
+    const ExchangeUndone undone = UndoExchange(left.Path(), dir);
+    if (undone.back > 0) {
+      Notice(
+          fmt::format("{}: an earlier run was killed while it put its files in place; the {} "
+                      "files from before it are back",
+                      dir.string(), undone.back));
+    }
+    for (const fs::path& kept : undone.kept) {
+      Notice(
+          fmt::format("{}: an earlier run was killed while it put its files in place, and "
+                      "another file has this file's place by now; move it where you need it, "
+                      "then remove {}",
+                      kept.string(), left.Path().string()));
+    }
+    if (!undone.kept.empty()) {
+      left.Keep();
     }
   }
-  for (const std::string& name : names) {
-    Status moved;
-    if (&name == &names.back()) {
-      moved = FlushFolders(folders);
-    }
-    moved = moved.and_then([&] { return moves.Move(from / name, to / name, to / name); });
-    if (!moved) {
-      return moved;
-    }
-  }
-  return FlushFolders(folders);
 }
 
 }  // namespace
@@ -148,17 +103,18 @@ Result<OutputFolder> OutputFolder::Open(const fs::path& dir) {
   if (Status made = MakeFolders(dir, folder.created_); !made) {
     return tl::unexpected(made.error());
   }
-  Result<fs::path> staging_dir = MakeStagingDir(dir);
-  if (!staging_dir) {
-    return tl::unexpected(staging_dir.error());
+  CleanUp(dir);
+  Result<OwnFolder> staging = OwnFolder::Make(dir, kStaging);
+  if (!staging) {
+    return tl::unexpected(staging.error());
   }
-  folder.staging_dir_ = *std::move(staging_dir);
+  folder.staging_.emplace(*std::move(staging));
   return folder;
 }
 
 OutputFolder::OutputFolder(OutputFolder&& other) noexcept
     : dir_(std::move(other.dir_)),
-      staging_dir_(std::exchange(other.staging_dir_, {})),
+      staging_(std::exchange(other.staging_, std::nullopt)),
       created_(std::exchange(other.created_, {})),
       names_(std::exchange(other.names_, {})),
       retired_(std::exchange(other.retired_, {})) {}
@@ -167,15 +123,15 @@ OutputFolder::~OutputFolder() { Discard(); }
 
 fs::path OutputFolder::Stage(const std::string& name) {
   const fs::path relative(name);
-  SATEEN_CHECK(!staging_dir_.empty());
+  SATEEN_CHECK(staging_.has_value());
   SATEEN_CHECK(relative.has_filename() && relative.is_relative());
   SATEEN_CHECK(std::find(relative.begin(), relative.end(), "..") == relative.end());
   if (std::find(names_.begin(), names_.end(), name) == names_.end()) {
     names_.push_back(name);
   }
   std::error_code ignored;  // whoever writes the file will fail and say why
-  fs::create_directories((staging_dir_ / relative).parent_path(), ignored);
-  return staging_dir_ / relative;
+  fs::create_directories((staging_->Path() / relative).parent_path(), ignored);
+  return staging_->Path() / relative;
 }
 
 Status OutputFolder::WriteText(const std::string& name, const std::string& text) {
@@ -185,7 +141,7 @@ Status OutputFolder::WriteText(const std::string& name, const std::string& text)
 void OutputFolder::Retire(const std::string& name) { retired_.push_back(name); }
 
 Error OutputFolder::InPlace(Error error) const {
-  const std::string staged = staging_dir_.string();
+  const std::string staged = staging_ ? staging_->Path().string() : "";
   for (size_t at = error.message.find(staged); !staged.empty() && at != std::string::npos;
        at = error.message.find(staged)) {
     error.message.replace(at, staged.size(), dir_.string());
@@ -194,17 +150,12 @@ Error OutputFolder::InPlace(Error error) const {
 }
 
 Status OutputFolder::Commit() {
-  SATEEN_CHECK(!staging_dir_.empty());
+  SATEEN_CHECK(staging_.has_value());
   for (const std::string& name : names_) {
     const fs::path place = dir_ / name;
-    std::error_code ignored;
-    if (fs::is_directory(fs::symlink_status(place, ignored))) {
-      return Fail(ErrorCode::kIo, "{}: is a folder where a file must go; move it away",
-                  place.string());
-    }
-    Status ready = FlushToDisk(staging_dir_ / name, place).and_then([&] {
-      return MakeFolders(place.parent_path(), created_);
-    });
+    Status ready = CheckPlace(dir_, name)
+                       .and_then([&] { return FlushToDisk(staging_->Path() / name, place); })
+                       .and_then([&] { return MakeFolders(place.parent_path(), created_); });
     if (!ready) {
       return ready;
     }
@@ -219,11 +170,11 @@ Status OutputFolder::Commit() {
   std::sort(folders.begin(), folders.end());
   folders.erase(std::unique(folders.begin(), folders.end()), folders.end());
 
-  Moves moves;
-  if (Status placed = PutInPlace(staging_dir_, dir_, names_, retired_, folders, moves); !placed) {
-    if (!moves.TakeBack()) {  // earlier files must not go with the staging folder
-      placed.error().message += fmt::format("; the files that were there are kept in {}",
-                                            std::exchange(staging_dir_, {}).string());
+  bool keeps_former = false;
+  const FileExchange exchange = {staging_->Path(), dir_, names_, retired_};
+  if (Status placed = exchange.Run(folders, keeps_former); !placed) {
+    if (keeps_former) {
+      staging_->Keep();
     }
     return placed;
   }
@@ -233,10 +184,8 @@ Status OutputFolder::Commit() {
 }
 
 void OutputFolder::Discard() noexcept {
+  staging_.reset();
   std::error_code ignored;
-  if (!staging_dir_.empty()) {
-    fs::remove_all(std::exchange(staging_dir_, {}), ignored);
-  }
   for (; !created_.empty(); created_.pop_back()) {
     fs::remove(created_.back(), ignored);  // only where it is empty
   }
@@ -247,26 +196,32 @@ Status WriteFileWhole(const fs::path& path, const std::string& text) {
   // Through a symbolic link to the file that it stands for.
   const fs::path target =
       fs::is_symlink(path, ignored) ? fs::weakly_canonical(path, ignored) : path;
-  if (target.empty() || fs::is_directory(target, ignored)) {
+  const fs::file_status old = fs::status(target, ignored);
+  if (target.empty() || fs::is_directory(old)) {
     return Fail(ErrorCode::kIo, "{}: is a folder; give the name of a file", path.string());
   }
-  const Result<fs::path> staging_dir = MakeStagingDir(ParentOf(target));
-  if (!staging_dir) {
-    return tl::unexpected(staging_dir.error());
+  if (fs::exists(old) && !fs::is_regular_file(old)) {
+    return Fail(ErrorCode::kIo, "{}: is a device or a pipe; give the name of a file",
+                path.string());
   }
-  const fs::path staged = *staging_dir / "file";
+  CleanUp(ParentOf(target));
+  const Result<OwnFolder> staging = OwnFolder::Make(ParentOf(target), kStaging);
+  if (!staging) {
+    return tl::unexpected(staging.error());
+  }
+  const fs::path staged = staging->Path() / "file";
   Status status =
       WriteBytes(staged, text, path).and_then([&] { return FlushToDisk(staged, path); });
-  if (status) {
-    if (const fs::file_status old = fs::status(target, ignored); fs::exists(old)) {
-      fs::permissions(staged, old.permissions(), ignored);
-    }
-    status = Moves().Move(staged, target, path).and_then([&] {
-      return FlushFolders({ParentOf(target)});
-    });
+  if (!status) {
+    return status;
   }
-  fs::remove_all(*staging_dir, ignored);
-  return status;
+  if (fs::exists(old)) {
+    fs::permissions(staged, old.permissions(), ignored);
+  }
+  if (rename(staged.c_str(), target.c_str()) != 0) {
+    return Fail(ErrorCode::kIo, "{}: cannot put in place: {}", path.string(), SystemReason(errno));
+  }
+  return FlushFolders({ParentOf(target)});
 }
 
 }  // namespace sateen

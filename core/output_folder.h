@@ -1,11 +1,13 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "core/error.h"
 #include "core/file_io.h"
+#include "core/own_folder.h"
 
 namespace sateen {
 
@@ -15,7 +17,9 @@ namespace sateen {
 /// Commit() flushes them to the disk and renames each to its place, in the order staged, so the
 /// last one (the record) is there only when all others are; an old record goes first. Without
 /// Commit(), or when it fails, everything written is removed, old files are as they were, and the
-/// folder is removed if Open() made it.
+/// folder is removed if Open() made it. What a killed run left hidden in the folder is removed by
+/// the next Open(). If it was killed within Commit(), its former files are put back, and a notice
+/// says so.
 class OutputFolder {
  public:
   // Creates `dir` where it is missing. kIo where it cannot be created or written to.
@@ -36,7 +40,8 @@ class OutputFolder {
   // Returns the error of whoever wrote to a staged place, speaking of the place that the user
   // knows.
   [[nodiscard]] Error InPlace(Error error) const;
-  // Fails with kIo, which names the file that could not be flushed or put in place.
+  // Fails with kIo, which names the file that could not be flushed or put in place, or the link or
+  // folder that has its place.
   [[nodiscard]] Status Commit();
 
   [[nodiscard]] const std::filesystem::path& Dir() const { return dir_; }
@@ -46,13 +51,14 @@ class OutputFolder {
   void Discard() noexcept;
 
   std::filesystem::path dir_;
-  std::filesystem::path staging_dir_;           // empty once committed, discarded or moved from
+  std::optional<OwnFolder> staging_;            // absent once committed, discarded or moved from
   std::vector<std::filesystem::path> created_;  // folders made by Open(), outermost first
   std::vector<std::string> names_;
   std::vector<std::string> retired_;
 };
 
-// Replaces one file whole or not at all, keeping its permissions; its folder must exist.
+// Replaces one file whole or not at all, keeping its permissions; its folder must exist. Where
+// `path` is a link, the file that it leads to is replaced. kIo: it is no regular file.
 [[nodiscard]] Status WriteFileWhole(const std::filesystem::path& path, const std::string& text);
 
 }  // namespace sateen

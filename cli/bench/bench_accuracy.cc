@@ -12,7 +12,7 @@
 #include "cli/bench/best_seconds.h"
 #include "core/angle.h"
 #include "core/output_folder.h"
-#include "core/scratch_folder.h"
+#include "core/own_folder.h"
 #include "pipelines/simulate/scene_file.h"
 #include "pipelines/simulate/simulated_session.h"
 #include "scanner/sessions/dataset.h"
@@ -139,8 +139,9 @@ class AccuracyBench {
     if (!scene) {
       return tl::unexpected(scene.error());
     }
-    const ScratchFolder scratch("bench-accuracy");
-    Result<OutputFolder> folder = OutputFolder::Open(scratch.Path());
+    const Result<OwnFolder> scratch = MakeScratchFolder("bench-accuracy");
+    Result<OutputFolder> folder = scratch ? OutputFolder::Open(scratch->Path())
+                                          : tl::unexpected(scratch.error());
     Status status =
         folder
             ? StageSimulatedSession(*scene, FrameFormat::kRawDng, Quiet(0), *folder).and_then([&] {
@@ -152,7 +153,7 @@ class AccuracyBench {
     }
     const std::string name = file.stem().string();
     const auto read = [&](Domain domain) {
-      return ReadDataset(scratch.Path(), {.domain = domain, .scratch_dir = scratch.Path()},
+      return ReadDataset(scratch->Path(), {.domain = domain, .scratch_dir = scratch->Path()},
                          Quiet(0));
     };
     const Result<Dataset> colours = read(Domain::kRgb);

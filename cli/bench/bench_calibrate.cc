@@ -11,7 +11,7 @@
 #include "core/json.h"
 #include "core/output_folder.h"
 #include "core/parallel.h"
-#include "core/scratch_folder.h"
+#include "core/own_folder.h"
 #include "imaging/raw.h"
 #include "pipelines/calibrate/calibrate_lights.h"
 #include "pipelines/simulate/simulate.h"
@@ -46,14 +46,14 @@ json SceneOf(const json& surface, const json& materials, const char* kind, int s
 class CalibrateBench {
  public:
   CalibrateBench(const BenchCalibrateArgs& args, const Task& task)
-      : args_(args), task_(task), scratch_("bench-calibrate") {
+      : args_(args), task_(task), scratch_(MakeScratchFolder("bench-calibrate")) {
     report_.size = {args.width, args.height};
     report_.threads = task.ThreadCount();
   }
 
   Result<CalibrateBenchReport> Run() {
     const Status status =
-        scratch_.Create()
+        scratch_.map([](const OwnFolder&) {})
             .and_then([&] { return WriteRigs(); })
             .and_then([&] { return SimulateAll(); })
             .and_then([&] { return MeasureRaw(); })
@@ -70,7 +70,7 @@ class CalibrateBench {
  private:
   [[nodiscard]] Task Quiet() const { return {.threads = task_.threads, .cancel = task_.cancel}; }
   [[nodiscard]] std::string Path(const std::string& name) const {
-    return (scratch_.Path() / name).string();
+    return (scratch_->Path() / name).string();
   }
 
   Status WriteRigs() {
@@ -219,7 +219,7 @@ class CalibrateBench {
 
   const BenchCalibrateArgs& args_;
   const Task task_;
-  const ScratchFolder scratch_;
+  const Result<OwnFolder> scratch_;
   Rig rig_;
   CalibrateBenchReport report_;
 };

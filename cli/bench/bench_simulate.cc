@@ -11,7 +11,7 @@
 #include "cli/bench/bench_simulate_report.h"
 #include "cli/bench/peak_memory.h"
 #include "cli/bench/scene_switches.h"
-#include "core/scratch_folder.h"
+#include "core/own_folder.h"
 #include "imaging/dng.h"
 #include "imaging/image_io.h"
 #include "imaging/raw.h"
@@ -87,8 +87,8 @@ class SimulateBench {
 
   // Does the work of `sateen simulate` for a RAW session, step by step.
   Status MeasureSession() {
-    const ScratchFolder scratch("bench-simulate");
-    Result<Scene> scene = scratch.Create().and_then([&] { return PlainScene(report_.size); });
+    const Result<OwnFolder> scratch = MakeScratchFolder("bench-simulate");
+    Result<Scene> scene = scratch ? PlainScene(report_.size) : tl::unexpected(scratch.error());
     Sensor sensor = *SensorNamed("nikon-d5100");
     sensor.full_scale = kFullScale;
     if (!scene) {
@@ -119,7 +119,7 @@ class SimulateBench {
         return tl::unexpected(mosaic.error());
       }
       const DngHeader header{.cfa = sensor.cfa, .black = sensor.black_dn, .white = sensor.white_dn};
-      const fs::path file = scratch.Path() / fmt::format("{}.dng", k);
+      const fs::path file = scratch->Path() / fmt::format("{}.dng", k);
       if (Status status = Timed(writing_s, [&] { return WriteDng(file, *mosaic, header); });
           !status) {
         return status;

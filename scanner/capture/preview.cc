@@ -6,7 +6,7 @@
 #include <cmath>
 #include <utility>
 
-#include "core/scratch_folder.h"
+#include "core/own_folder.h"
 #include "imaging/color.h"
 #include "imaging/image_io.h"
 #include "imaging/raw.h"
@@ -198,8 +198,8 @@ Result<Preview> TakePreview(const PreviewRequest& request, RigDevices& devices, 
   if (!light) {
     return tl::unexpected(light.error());
   }
-  const ScratchFolder folder("preview");
-  const Result<LightBoard*> board = folder.Create().and_then([&] { return devices.Board(); });
+  const Result<OwnFolder> folder = MakeScratchFolder("preview");
+  const Result<LightBoard*> board = folder ? devices.Board() : tl::unexpected(folder.error());
   const Result<TetheredCamera*> camera = board ? devices.Camera() : tl::unexpected(board.error());
   if (!camera) {
     return tl::unexpected(camera.error());
@@ -207,7 +207,7 @@ Result<Preview> TakePreview(const PreviewRequest& request, RigDevices& devices, 
   FrameTaker taker(**board, **camera,
                    {.f_number = request.f_number, .iso = request.iso, .level = request.level}, {},
                    task);
-  PreviewShooter shooter(*light, rig ? rig->response : std::nullopt, taker, folder.Path());
+  PreviewShooter shooter(*light, rig ? rig->response : std::nullopt, taker, folder->Path());
   const Result<Shot> shot = request.exposure_s ? shooter.Take(*request.exposure_s) : shooter.Find();
   if (!shot) {
     devices.CloseCamera();

@@ -53,20 +53,22 @@ Status Describe(const fs::path& folder, const UsbIdentity& identity) {
   return {};
 }
 
+bool LeadsToTerminal(const fs::path& link) {
+  std::error_code ignored;
+  return fs::read_symlink(link, ignored).string().starts_with("/dev/pts/");
+}
+
 }  // namespace
 
 Result<VirtualPort> VirtualPort::Open(const UsbIdentity& identity,
                                       std::optional<std::string> link) {
-  std::error_code failed;
-  std::string pattern = (fs::temp_directory_path(failed) / "sateen-virtual-rig-XXXXXX").string();
-  if (failed || mkdtemp(pattern.data()) == nullptr) {
-    return Fail(ErrorCode::kIo, "{}: {}; set TMPDIR to a folder that can be written", pattern,
-                SystemReason(errno));
+  Result<OwnFolder> folder = MakeScratchFolder("virtual-rig");
+  if (!folder) {
+    return tl::unexpected(folder.error());
   }
-  VirtualPort port;
-  port.folder_ = pattern;
+  VirtualPort port(*std::move(folder));
   port.link_ = std::move(link);
-  if (const Status described = Describe(port.folder_, identity); !described) {
+  if (const Status described = Describe(port.Folder(), identity); !described) {
     return tl::unexpected(described.error());
   }
   if (const Status plugged = port.Plug(); !plugged) {
@@ -76,7 +78,7 @@ Result<VirtualPort> VirtualPort::Open(const UsbIdentity& identity,
 }
 
 VirtualPort::VirtualPort(VirtualPort&& other) noexcept
-    : folder_(std::exchange(other.folder_, {})),
+    : folder_(std::move(other.folder_)),
       link_(std::move(other.link_)),
       terminal_(std::move(other.terminal_)),
       master_(std::exchange(other.master_, -1)),
@@ -85,10 +87,6 @@ VirtualPort::VirtualPort(VirtualPort&& other) noexcept
 
 VirtualPort::~VirtualPort() {
   Unplug();
-  if (!folder_.empty()) {
-    std::error_code ignored;
-    fs::remove_all(folder_, ignored);
-  }
 }
 
 Status VirtualPort::Plug() {
@@ -111,17 +109,17 @@ Status VirtualPort::Plug() {
   fcntl(master_, F_SETFD, FD_CLOEXEC);
   terminal_ = name.data();
   std::error_code failed;
-  fs::create_symlink(terminal_, folder_ / "dev" / kTty, failed);
+  fs::create_symlink(terminal_, Folder() / "dev" / kTty, failed);
   fs::create_symlink(fs::path("../..") / kDevice / "1-1:1.0/tty" / kTty,
-                     folder_ / "class/tty" / kTty, failed);
+                     Folder() / "class/tty" / kTty, failed);
   if (!failed && link_) {
-    if (fs::is_symlink(*link_)) {
+    if (fs::is_symlink(*link_) && LeadsToTerminal(*link_)) {  // left by a rig that was killed
       fs::remove(*link_, failed);
     }
     fs::create_symlink(terminal_, *link_, failed);
   }
   if (failed) {
-    const std::string at = link_.value_or(folder_.string());
+    const std::string at = link_.value_or(Folder().string());
     Unplug();
     return Fail(ErrorCode::kIo, "{}: no link to the port can be made: {}; choose another path", at,
                 failed.message());
@@ -134,8 +132,8 @@ void VirtualPort::Unplug() {
     return;
   }
   std::error_code ignored;
-  fs::remove(folder_ / "class/tty" / kTty, ignored);
-  fs::remove(folder_ / "dev" / kTty, ignored);
+  fs::remove(Folder() / "class/tty" / kTty, ignored);
+  fs::remove(Folder() / "dev" / kTty, ignored);
   if (link_ && fs::is_symlink(*link_) && fs::read_symlink(*link_, ignored) == terminal_) {
     fs::remove(*link_, ignored);
   }

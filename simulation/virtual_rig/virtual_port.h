@@ -5,9 +5,11 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/error.h"
+#include "core/own_folder.h"
 
 namespace sateen {
 
@@ -36,7 +38,8 @@ struct UsbIdentity {
 class VirtualPort {
  public:
   // The folder is a new one under the system's temporary folder and goes with this object. `link`,
-  // if any, is made to point to the pseudo terminal while plugged. kIo where the system refuses.
+  // if any, is made to point to the pseudo terminal while plugged. kIo where the system refuses, or
+  // where `link` is something else than a link to a terminal.
   static Result<VirtualPort> Open(const UsbIdentity& identity, std::optional<std::string> link);
   VirtualPort(VirtualPort&& other) noexcept;
   VirtualPort& operator=(VirtualPort&&) = delete;
@@ -44,7 +47,7 @@ class VirtualPort {
 
   // Returns the name of the pseudo terminal; empty while unplugged.
   [[nodiscard]] const std::string& Terminal() const { return terminal_; }
-  [[nodiscard]] const std::filesystem::path& Folder() const { return folder_; }
+  [[nodiscard]] const std::filesystem::path& Folder() const { return folder_.Path(); }
   // Returns the board's name for a program under port_preload.c.
   [[nodiscard]] std::string Name() const { return "/dev/ttyACM0"; }
 
@@ -62,10 +65,10 @@ class VirtualPort {
   [[nodiscard]] bool InUse() const { return in_use_; }
 
  private:
-  VirtualPort() = default;
+  explicit VirtualPort(OwnFolder folder) : folder_(std::move(folder)) {}
   [[nodiscard]] bool SpeedsDiffer(double board_baud) const;
 
-  std::filesystem::path folder_;
+  OwnFolder folder_;
   std::optional<std::string> link_;
   std::string terminal_;
   int master_ = -1;

@@ -44,7 +44,7 @@ TEST_P(InterruptDeathTest, SignalThatWasIgnoredStaysIgnored) {
   EXPECT_EXIT(raise_ignored(), ExitedWithCode(0), "");
 }
 
-INSTANTIATE_TEST_SUITE_P(Signals, InterruptDeathTest, ::testing::Values(SIGINT, SIGTERM));
+INSTANTIATE_TEST_SUITE_P(Signals, InterruptDeathTest, ::testing::Values(SIGINT, SIGTERM, SIGHUP));
 
 }  // namespace
 }  // namespace sateen::interrupt_test

@@ -3,16 +3,33 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>
+#include <sys/syscall.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "core/notice.h"
 #include "tests/testing/files.h"
 #include "tests/testing/full_disk.h"
+#include "tests/testing/tree.h"
+
+namespace {
+
+int renames_left = -1;  // until the process is killed; below 0: never
+
+}  // namespace
+
+// Replaced in this program alone.
+extern "C" int rename(const char* from, const char* to) {
+  if (renames_left-- == 0) {
+    _exit(77);
+  }
+  return static_cast<int>(syscall(SYS_rename, from, to));
+}
 
 namespace sateen::output_folder_test {
 namespace {
@@ -20,20 +37,11 @@ namespace {
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using testing::Listing;
 
 namespace fs = std::filesystem;
 
 constexpr fs::perms kReadOnly = static_cast<fs::perms>(0555);
-
-// Every file and folder below `dir`, sorted, hidden ones too.
-std::vector<std::string> Listing(const fs::path& dir) {
-  std::vector<std::string> names;
-  for (const auto& entry : fs::recursive_directory_iterator(dir)) {
-    names.push_back(fs::relative(entry.path(), dir).string());
-  }
-  std::sort(names.begin(), names.end());
-  return names;
-}
 
 std::string Text(const fs::path& path) { return ReadFileBytes(path).value_or("(absent)"); }
 
@@ -251,7 +259,145 @@ TEST_F(OutputFolderTest, FullDiskFailsTheWriteAndKeepsOldFiles) {
   EXPECT_EQ(Text(dir_ / "solve.json"), "old");
 }
 
+// Replaces a.exr, b/b.exr and solve.json, adds new.exr and takes away old.exr.
+Status SecondRun(const fs::path& dir) {
+  return OutputFolder::Open(dir).and_then([](OutputFolder folder) {
+    Status status;
+    for (const char* name : {"a.exr", "b/b.exr", "new.exr", "solve.json"}) {
+      status =
+          status.and_then([&] { return folder.WriteText(name, std::string("second ") + name); });
+    }
+    folder.Retire("old.exr");
+    return status.and_then([&] { return folder.Commit(); });
+  });
+}
+
+class KilledInCommitTest : public OutputFolderTest {
+ protected:
+  void FirstRun() {
+    OutputFolder folder = OutputFolder::Open(dir_).value();
+    for (const char* name : {"a.exr", "b/b.exr", "old.exr", "solve.json"}) {
+      ASSERT_TRUE(folder.WriteText(name, std::string("first ") + name));
+    }
+    ASSERT_TRUE(folder.Commit());
+    testing::WriteText(dir_ / "notes.txt", "mine");
+  }
+  // Whether the second run was killed at that rename.
+  bool KillSecondRunAt(int rename) const {
+    const pid_t child = fork();
+    if (child == 0) {
+      renames_left = rename;
+      _exit(SecondRun(dir_) ? 0 : 1);
+    }
+    int status = 0;
+    waitpid(child, &status, 0);
+    EXPECT_THAT(WEXITSTATUS(status), ::testing::AnyOf(0, 77));
+    return WEXITSTATUS(status) == 77;
+  }
+  // What Open() and leaving without Commit() says and leaves.
+  std::vector<std::string> NextRun() const {
+    std::vector<std::string> notices;
+    const NoticesTo here([&](const std::string& text) { notices.push_back(text); });
+    (void)OutputFolder::Open(dir_).value();
+    return notices;
+  }
+};
+
+TEST_F(KilledInCommitTest, NextRunPutsFormerFilesBackFromEveryMove) {
+  FirstRun();
+  const auto first = testing::Tree(dir_);
+  int kills = 0;
+  for (; KillSecondRunAt(kills); ++kills) {
+    const std::vector<std::string> notices = NextRun();
+
+    EXPECT_EQ(testing::Tree(dir_), first) << "after a kill at move " << kills;
+    if (kills > 0) {
+      ASSERT_THAT(notices, ::testing::SizeIs(1)) << kills;
+      EXPECT_THAT(notices[0], HasSubstr(dir_.string() + ": an earlier run was killed while it put "
+                                                        "its files in place; the "));
+    }
+  }
+  EXPECT_EQ(kills, 8);  // four files aside, four in their places
+  EXPECT_THAT(Listing(dir_),
+              ElementsAre("a.exr", "b", "b/b.exr", "new.exr", "notes.txt", "solve.json"));
+  EXPECT_EQ(Text(dir_ / "a.exr"), "second a.exr");
+}
+
+TEST_F(KilledInCommitTest, PuttingBackThatIsKilledTooIsGoneOnWith) {
+  FirstRun();
+  const auto first = testing::Tree(dir_);
+  bool killed = true;
+  for (int rename = 0; killed; ++rename) {
+    ASSERT_TRUE(KillSecondRunAt(7));  // all but the record are in their places
+    killed = KillSecondRunAt(rename);
+    if (killed) {
+      NextRun();
+      EXPECT_EQ(testing::Tree(dir_), first) << "after a second kill at move " << rename;
+    }
+  }
+}
+
+TEST_F(KilledInCommitTest, WhatHasThePlaceByNowStaysAndTheFormerFileIsNamed) {
+  FirstRun();
+  ASSERT_TRUE(KillSecondRunAt(7));
+  fs::remove(dir_ / "a.exr");
+  testing::WriteText(dir_ / "a.exr", "by hand");
+
+  const std::vector<std::string> notices = NextRun();
+
+  EXPECT_EQ(Text(dir_ / "a.exr"), "by hand");
+  EXPECT_EQ(Text(dir_ / "b/b.exr"), "first b/b.exr");
+  EXPECT_FALSE(fs::exists(dir_ / "new.exr"));
+  ASSERT_THAT(notices, ::testing::SizeIs(2));
+  EXPECT_THAT(notices[0], HasSubstr("the 3 files from before it are back"));
+  const fs::path kept = notices[1].substr(0, notices[1].find(": "));
+  EXPECT_EQ(Text(kept), "first a.exr");
+  EXPECT_THAT(NextRun(), ElementsAre(notices[1]));  // until someone has taken it
+  fs::remove(kept);
+  EXPECT_THAT(NextRun(), IsEmpty());
+  EXPECT_THAT(Listing(dir_),
+              ElementsAre("a.exr", "b", "b/b.exr", "notes.txt", "old.exr", "solve.json"));
+}
+
+TEST_F(OutputFolderTest, LinksAndDevicesInTheWayAreRefusedAndLeft) {
+  const fs::path far = temp_.Path() / "far";
+  testing::WriteText(far / "normal.exr", "mine");
+  fs::create_directories(dir_);
+  fs::create_symlink(far / "normal.exr", dir_ / "normal.exr");
+  fs::create_directory_symlink(far, dir_ / "truth");
+  ASSERT_EQ(mkfifo((dir_ / "pipe").c_str(), 0600), 0);
+  const auto before = testing::Tree(temp_.Path());
+  for (const auto& [name, words] :
+       {std::pair("normal.exr", "normal.exr: is a link where a file must go; move it away"),
+        std::pair("truth/normal.exr", "truth: is a link where a folder must go; move it away"),
+        std::pair("pipe", "pipe: is a device or a pipe where a file must go; move it away")}) {
+    {
+      OutputFolder folder = OutputFolder::Open(dir_).value();
+      ASSERT_TRUE(folder.WriteText("a.exr", "a"));
+      ASSERT_TRUE(folder.WriteText(name, "new"));
+      const Status committed = folder.Commit();
+      ASSERT_FALSE(committed);
+      EXPECT_EQ(committed.error().code, ErrorCode::kIo);
+      EXPECT_EQ(committed.error().message, (dir_ / words).string());
+    }
+    EXPECT_EQ(testing::Tree(temp_.Path()), before);
+  }
+}
+
 using WriteFileWholeTest = OutputFolderTest;
+
+TEST_F(WriteFileWholeTest, DevicesAndPipesAreRefused) {
+  ASSERT_EQ(mkfifo((temp_.Path() / "pipe").c_str(), 0600), 0);
+  fs::create_symlink("pipe", temp_.Path() / "link.json");
+  for (const char* name : {"pipe", "link.json"}) {
+    const Status written = WriteFileWhole(temp_.Path() / name, "x");
+    ASSERT_FALSE(written);
+    EXPECT_EQ(written.error().code, ErrorCode::kIo);
+    EXPECT_EQ(written.error().message,
+              (temp_.Path() / name).string() + ": is a device or a pipe; give the name of a file");
+  }
+  EXPECT_THAT(Listing(temp_.Path()), ElementsAre("link.json", "pipe"));
+}
 
 TEST_F(WriteFileWholeTest, CreatesAndReplaces) {
   const fs::path path = temp_.Path() / "rig.json";

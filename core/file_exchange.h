@@ -1,0 +1,45 @@
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "core/error.h"
+
+namespace sateen {
+
+/// Files in a staging folder that take the places of those in a folder, all of them or none.
+///
+///     STAGING/NAME             a new file, flushed to the disk
+///     STAGING/.exchange        the new files, written before the first of them moves
+///     STAGING/.replaced/NAME   a former file, once it has moved aside
+///
+/// The last of `names` is the record, which describes the others: it leaves first and arrives last.
+struct FileExchange {
+  std::filesystem::path staging;
+  std::filesystem::path dir;
+  std::vector<std::string> names;
+  std::vector<std::string> retired;  // former files that go without a new one
+
+  /// Fails with kIo, which names the file. Then all is as before, or the message says where the
+  /// former files are, and `keeps_former` is set.
+  [[nodiscard]] Status Run(const std::vector<std::filesystem::path>& folders,
+                           bool& keeps_former) const;
+};
+
+// What became of an exchange in which the process was killed.
+struct ExchangeUndone {
+  std::size_t back = 0;                     // former files that are in their places again
+  std::vector<std::filesystem::path> kept;  // former files whose places are taken, in `staging`
+};
+
+// Undoes the exchange in `staging` if it was begun and is not complete. New files that came to
+// their places go; what else is there by now stays.
+[[nodiscard]] ExchangeUndone UndoExchange(const std::filesystem::path& staging,
+                                          const std::filesystem::path& dir);
+
+// Flushes the folders that can be read; others cannot be flushed either.
+[[nodiscard]] Status FlushFolders(const std::vector<std::filesystem::path>& folders);
+
+}  // namespace sateen

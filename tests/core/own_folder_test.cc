@@ -1,0 +1,174 @@
+#include "core/own_folder.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "tests/testing/files.h"
+#include "tests/testing/tree.h"
+
+namespace sateen::own_folder_test {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::SizeIs;
+
+namespace fs = std::filesystem;
+
+constexpr const char* kPrefix = ".sateen-";
+
+class OwnFolderTest : public ::testing::Test {
+ protected:
+  // Makes a folder with a file in a process that ends without removing it, as a killed one does.
+  fs::path LeftByKilledProcess() const {
+    const pid_t child = fork();
+    if (child == 0) {
+      const OwnFolder folder = OwnFolder::Make(temp_.Path(), kPrefix).value();
+      testing::WriteText(folder.Path() / "deep/file", folder.Path().string());
+      testing::WriteText(temp_.Path() / "name", folder.Path().string());
+      _exit(0);
+    }
+    waitpid(child, nullptr, 0);
+    const fs::path left = testing::ReadText(temp_.Path() / "name");
+    fs::remove(temp_.Path() / "name");
+    return left;
+  }
+  [[nodiscard]] std::vector<OwnFolder> Abandoned() const {
+    return OwnFolder::Abandoned(temp_.Path(), kPrefix);
+  }
+
+  const testing::TempFolder temp_;
+};
+
+TEST_F(OwnFolderTest, IsRemovedWithAllInItAndNothingElse) {
+  testing::WriteText(temp_.Path() / "mine", "mine");
+  {
+    OwnFolder folder = OwnFolder::Make(temp_.Path(), kPrefix).value();
+    const OwnFolder moved = std::move(folder);
+    testing::WriteText(moved.Path() / "deep/file", "x");
+    fs::create_symlink(temp_.Path(), moved.Path() / "link");
+    EXPECT_THAT(moved.Path().filename().string(), ::testing::MatchesRegex("\\.sateen-......"));
+  }
+  EXPECT_THAT(testing::Listing(temp_.Path()), ElementsAre("mine"));
+}
+
+TEST_F(OwnFolderTest, KeptFolderStays) {
+  fs::path path;
+  {
+    OwnFolder folder = OwnFolder::Make(temp_.Path(), kPrefix).value();
+    path = folder.Path();
+    folder.Keep();
+  }
+  EXPECT_TRUE(fs::is_directory(path));
+}
+
+TEST_F(OwnFolderTest, LeftByAKilledProcessGoesToTheNextRun) {
+  const fs::path left = LeftByKilledProcess();
+  ASSERT_TRUE(fs::exists(left / "deep/file"));
+  {
+    const std::vector<OwnFolder> abandoned = Abandoned();
+    ASSERT_THAT(abandoned, SizeIs(1));
+    EXPECT_EQ(abandoned[0].Path(), left);
+    EXPECT_THAT(Abandoned(), IsEmpty()) << "two runs took it at once";
+  }
+  EXPECT_FALSE(fs::exists(left));
+}
+
+TEST_F(OwnFolderTest, OfALivingProcessIsNeverTouched) {
+  const OwnFolder alive = OwnFolder::Make(temp_.Path(), kPrefix).value();
+  testing::WriteText(alive.Path() / "file", "x");
+
+  EXPECT_THAT(Abandoned(), IsEmpty());
+
+  EXPECT_TRUE(fs::exists(alive.Path() / "file"));
+}
+
+TEST_F(OwnFolderTest, KilledBeforeItsMarkIsRemovedIfEmpty) {
+  std::string name = (temp_.Path() / ".sateen-XXXXXX").string();
+  ASSERT_NE(mkdtemp(name.data()), nullptr);
+
+  EXPECT_THAT(Abandoned(), IsEmpty());
+
+  EXPECT_FALSE(fs::exists(name));
+}
+
+TEST_F(OwnFolderTest, WhatOnlyLooksAlikeIsLeftAlone) {
+  const fs::path own = LeftByKilledProcess();  // a real one, to link to from elsewhere
+  const fs::path far = temp_.Path() / "far";
+  fs::create_directory(far);
+  fs::rename(own, far / own.filename());
+  testing::WriteText(temp_.Path() / ".sateen-aaaaaa", "a file");
+  testing::WriteText(temp_.Path() / ".sateen-bbbbbb/notes", "no mark");
+  fs::permissions(temp_.Path() / ".sateen-bbbbbb", fs::perms::owner_all);
+  fs::create_directory_symlink(far / own.filename(), temp_.Path() / ".sateen-cccccc");
+  fs::create_directories(temp_.Path() / ".sateen-dddddd/.sateen-own");
+  fs::create_directory(temp_.Path() / ".sateen-eeeeee");
+  fs::create_symlink(far / own.filename() / ".sateen-own",
+                     temp_.Path() / ".sateen-eeeeee/.sateen-own");
+  fs::create_directory(temp_.Path() / ".sateen-ffffff");  // empty, as mkdir makes it
+  fs::permissions(temp_.Path() / ".sateen-ffffff", static_cast<fs::perms>(0755));
+  testing::WriteText(temp_.Path() / ".sateen-incoming/.sateen-own", "");
+  testing::WriteText(temp_.Path() / "sateen-gggggg/.sateen-own", "");
+  testing::WriteText(temp_.Path() / ".sateen-hh_hhh/.sateen-own", "");
+  ASSERT_EQ(mkfifo((temp_.Path() / ".sateen-iiiiii").c_str(), 0600), 0);
+  fs::create_directory(temp_.Path() / ".sateen-jjjjjj");
+  ASSERT_EQ(mkfifo((temp_.Path() / ".sateen-jjjjjj/.sateen-own").c_str(), 0600), 0);
+  const std::vector<std::string> before = testing::Listing(temp_.Path());
+
+  EXPECT_THAT(Abandoned(), IsEmpty());
+
+  EXPECT_EQ(testing::Listing(temp_.Path()), before);
+}
+
+TEST_F(OwnFolderTest, OfAnotherUserIsLeftAlone) {
+  if (geteuid() != 0) {
+    GTEST_SKIP() << "needs root, to give a folder away";
+  }
+  const fs::path left = LeftByKilledProcess();
+  ASSERT_EQ(chown(left.c_str(), 65534, 65534), 0);
+
+  EXPECT_THAT(Abandoned(), IsEmpty());
+
+  EXPECT_TRUE(fs::exists(left / "deep/file"));
+}
+
+TEST_F(OwnFolderTest, ErrorNamesTheFolderAndTheReason) {
+  const Result<OwnFolder> folder = OwnFolder::Make(temp_.Path() / "none", kPrefix);
+  ASSERT_FALSE(folder);
+  EXPECT_EQ(folder.error().code, ErrorCode::kIo);
+  EXPECT_EQ(
+      folder.error().message,
+      (temp_.Path() / "none").string() +
+          ": cannot write to this folder: No such file or directory; create the folder first");
+}
+
+TEST_F(OwnFolderTest, ScratchFoldersOfKilledProcessesGo) {
+  const std::string former = getenv("TMPDIR") != nullptr ? getenv("TMPDIR") : "/tmp";
+  setenv("TMPDIR", temp_.Path().c_str(), 1);
+  testing::WriteText(temp_.Path() / "sateen-preview-1-0/notes", "a name that once was ours");
+  const pid_t child = fork();
+  if (child == 0) {
+    const OwnFolder left = MakeScratchFolder("preview").value();
+    _exit(0);
+  }
+  waitpid(child, nullptr, 0);
+  EXPECT_THAT(testing::Listing(temp_.Path()), SizeIs(4));  // the folder left, and its mark
+  {
+    const OwnFolder scratch = MakeScratchFolder("preview").value();
+    EXPECT_THAT(testing::Listing(temp_.Path()), SizeIs(4));
+  }
+  setenv("TMPDIR", former.c_str(), 1);
+  EXPECT_THAT(testing::Listing(temp_.Path()),
+              ElementsAre("sateen-preview-1-0", "sateen-preview-1-0/notes"));
+}
+
+}  // namespace
+}  // namespace sateen::own_folder_test
