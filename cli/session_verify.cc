@@ -12,7 +12,7 @@ void AddSessionVerify(CLI::App& session, SessionVerifyArgs& args) {
   CLI::App* cmd = session.add_subcommand(
       "verify",
       "Verify a session: record, journal and rig agree, every light has its frame, every file has "
-      "its hash. Exit status 3 with a list of faults if not");
+      "its hash and lies in the session. Exit status 3 with a list of faults if not");
   cmd->add_option("session", args.session, "Folder of the session")->required();
   cmd->add_flag("--json", args.json, "Print JSON");
 }

@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <sys/file.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -71,6 +72,8 @@ Result<SessionFrame> ReadDone(JsonReader& json, const SessionFrame& planned) {
   SessionFrame frame = ReadSessionFrame(is);
   is.Require(frame.role == planned.role && frame.light == planned.light, "role",
              "and light are not those of the plan");
+  is.Require(fs::path(frame.file).parent_path() == "frames" && frame.file != "frames/..", "file",
+             fmt::format("is \"{}\"; need a file in frames/", frame.file));
   is.Require(frame.sha256.has_value(), "sha256", "is missing; need the file's hash");
   is.Require(frame.exposure_s && frame.f_number && frame.iso, "exposure_s",
              "or f_number or iso is missing; need all three as the camera had them");
@@ -152,6 +155,7 @@ class JournalReader {
     if (name == "frame begun") {
       json.Require(!done, "frame", "is begun again, but it is done");
       is_begun_[frame] = true;
+      journal_->begun_names.insert(FileNameOf(frame, journal_->plan[frame], {}));
     } else if (name == "frame done") {
       json.Require(is_begun_[frame] && !done, "frame", "is done, but was not begun");
       Result<SessionFrame> is = ReadDone(json, journal_->plan[frame]);
@@ -229,9 +233,14 @@ Result<std::optional<Journal>> ReadJournal(const fs::path& dir) {
 Result<JournalWriter> JournalWriter::Open(const fs::path& dir) {
   JournalWriter writer;
   writer.path_ = dir / kJournalFile;
-  writer.fd_ = open(writer.path_.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0666);
+  writer.fd_ = open(writer.path_.c_str(),
+                    O_WRONLY | O_CREAT | O_APPEND | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC, 0666);
   if (writer.fd_ < 0) {
     return Fail(ErrorCode::kIo, "{}: cannot write: {}", writer.path_.string(), SystemReason(errno));
+  }
+  struct stat found {};
+  if (fstat(writer.fd_, &found) != 0 || !S_ISREG(found.st_mode)) {
+    return Fail(ErrorCode::kIo, "{}: is a device or a pipe; move it away", writer.path_.string());
   }
   if (flock(writer.fd_, LOCK_EX | LOCK_NB) != 0) {
     return Fail(ErrorCode::kIo,

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -54,7 +55,9 @@ struct Journal {
   JournalBegun begun;
   FramePlan plan;                                 // empty until it is made
   std::vector<std::optional<SessionFrame>> done;  // one for each of the plan
-  int rejected = 0;                               // records of it
+  // Every frame that was ever begun, of earlier plans too: "frames/03-led-2", no extension.
+  std::set<std::filesystem::path> begun_names;
+  int rejected = 0;  // records of it
   bool complete = false;
   // Length of the whole lines. A part of a line beyond them was being written when the power went.
   // It does not count.
@@ -78,7 +81,8 @@ struct Journal {
 /// Errors   kIo: the file cannot be written or flushed; another program captures into this folder
 class JournalWriter {
  public:
-  // Locks the file, which is created where it is missing, and leaves it as it is.
+  // Locks the file, which is created where it is missing, and leaves it as it is. kIo also where it
+  // is a link, a device or a pipe.
   [[nodiscard]] static Result<JournalWriter> Open(const std::filesystem::path& dir);
   // Cuts off what is beyond these bytes; before the first append.
   [[nodiscard]] Status Keep(std::uint64_t bytes);

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "core/sha256.h"
+#include "scanner/capture/own_frames.h"
 #include "scanner/sessions/files/folder_listing.h"
 
 namespace sateen {
@@ -40,12 +41,12 @@ std::size_t FilesIn(const fs::path& dir) {
 
 // Fails if there are frames without a journal: the session has lost it, or they are not ours.
 Status CheckNoStrangers(const fs::path& dir) {
-  const std::size_t files = Exists(dir / kJournalFile) ? 0 : FilesIn(dir / "frames");
+  const std::size_t files = Exists(dir / kJournalFile) ? 0 : FilesIn(dir / kFramesFolder);
   return files == 0 ? Status()
                     : Fail(ErrorCode::kInvalidArgument,
                            "{}: holds {} files but there is no {} of them; restore it, or choose "
                            "another folder",
-                           (dir / "frames").string(), files, kJournalFile);
+                           (dir / kFramesFolder).string(), files, kJournalFile);
 }
 
 // Fails unless each light has its own channel: else two frames would show one light.
@@ -78,12 +79,36 @@ bool HasFrames(const fs::path& dir) {
   }));
 }
 
+// Fails where the session's copy of the rig would replace a rig that is not a copy of a capture.
+Status CheckRigPlace(const fs::path& dir, const fs::path& rig_file) {
+  const fs::path place = dir / kSavedRigFile;
+  if (!Exists(place)) {
+    return {};
+  }
+  const Result<std::string> there = Sha256OfFile(place);
+  const Result<std::string> wanted = there ? Sha256OfFile(rig_file) : there;
+  if (!wanted) {
+    return tl::unexpected(wanted.error());
+  }
+  const Result<std::optional<Journal>> former =
+      Exists(dir / kJournalFile) ? ReadJournal(dir) : std::optional<Journal>();
+  const bool is_copy = former && *former && (*former)->begun.rig_sha256 == *there;
+  if (*there == *wanted || is_copy) {
+    return {};
+  }
+  return Fail(ErrorCode::kInvalidArgument,
+              "{}: is another rig than {}, and the session keeps a copy of its rig there; choose "
+              "another folder, or move it away",
+              place.string(), rig_file.string());
+}
+
 }  // namespace
 
 Result<Rig> CheckBegin(const fs::path& dir, const fs::path& rig_file,
                        const CaptureOptions& options) {
   Result<Rig> rig = options.Validate().and_then([&] { return ReadRig(rig_file); });
   Status status = rig ? CheckLights(*rig, rig_file) : tl::unexpected(rig.error());
+  status = status.and_then([&] { return CheckNoLinks(dir); });
   if (status && (Exists(dir / kSessionFile) || HasFrames(dir))) {
     status =
         Fail(ErrorCode::kInvalidArgument,
@@ -91,13 +116,16 @@ Result<Rig> CheckBegin(const fs::path& dir, const fs::path& rig_file,
              "--resume {}",
              dir.string(), dir.string());
   }
-  status = status.and_then([&] { return CheckNoStrangers(dir); }).and_then([&] {
-    return CheckPlace(dir);
-  });
+  status = status.and_then([&] { return CheckNoStrangers(dir); })
+               .and_then([&] { return CheckRigPlace(dir, rig_file); })
+               .and_then([&] { return CheckPlace(dir); });
   return status ? std::move(rig) : tl::unexpected(status.error());
 }
 
 Result<Journal> CheckResume(const fs::path& dir) {
+  if (const Status own = CheckNoLinks(dir); !own) {
+    return tl::unexpected(own.error());
+  }
   if (!Exists(dir / kJournalFile)) {
     return Fail(ErrorCode::kIo, "{}: does not exist; nothing was captured",
                 (dir / kJournalFile).string());

@@ -37,6 +37,9 @@ class Prover {
       CheckFile(frame);
       task_.Advance();
     }
+    if (session->mask) {
+      (void)IsInside(*session->mask);
+    }
     return std::move(proof_);
   }
 
@@ -54,7 +57,21 @@ class Prover {
     proof_.faults.push_back(fmt::format(text, std::forward<Args>(args)...));
   }
 
+  // Adds a fault for a file that does not come along where the session is moved or copied.
+  bool IsInside(const std::string& name) {
+    if (!LeadsOutOf(dir_, name)) {
+      return true;
+    }
+    Add("{}: {} lies outside of the session, which is not whole without it; copy the file into the "
+        "session's folder and name it there",
+        (dir_ / kSessionFile).string(), name);
+    return false;
+  }
+
   void CheckRig(const Session& session) {
+    if (session.has_journal && !IsInside(session.rig)) {
+      return;
+    }
     const FrameFile file{.path = dir_ / session.rig, .sha256 = session.rig_sha256};
     if (!Take(CheckedHash(file))) {
       return;
@@ -118,6 +135,9 @@ class Prover {
   }
 
   void CheckFile(const SessionFrame& frame) {
+    if (!IsInside(frame.file)) {
+      return;
+    }
     if (!frame.sha256) {
       Add("{}: {} has no hash and cannot be verified", (dir_ / kSessionFile).string(), frame.file);
     } else if (Take(CheckedHash({.path = dir_ / frame.file, .sha256 = frame.sha256}))) {

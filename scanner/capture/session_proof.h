@@ -21,6 +21,7 @@ struct SessionProof {
 /// * session.json, journal and rig agree
 /// * each light has its frame
 /// * each file has the hash that was recorded
+/// * frames and mask lie in the session's folder, in a capture the rig too: a whole can be moved
 ///
 /// A session whose session.json names no journal, and that has none, was not made by a capture and
 /// is proved by what it records.

@@ -8,6 +8,7 @@
 #include "core/file_io.h"
 #include "core/output_folder.h"
 #include "core/sha256.h"
+#include "scanner/capture/own_frames.h"
 #include "scanner/capture/session_folder.h"
 #include "scanner/sessions/files/folder_listing.h"
 #include "scanner/sessions/frame_loader.h"
@@ -28,13 +29,35 @@ Status MakeFolder(const fs::path& path) {
   return {};
 }
 
+constexpr std::string_view kIncoming = ".sateen-incoming-";
+
+// Makes the folder that the camera delivers into. Removes the one that a killed capture left.
+Result<OwnFolder> MakeIncoming(const fs::path& dir) {
+  OwnFolder::Abandoned(dir, kIncoming).clear();
+  return OwnFolder::Make(dir, kIncoming);
+}
+
+// Removes the frames of a journal that is begun again.
+void RemoveBegun(const fs::path& dir) {
+  if (const Result<std::optional<Journal>> former = ReadJournal(dir); former && *former) {
+    RemoveFormerFrames(dir, **former);
+  }
+}
+
+// Writes the session's copy of the rig, unless it is there.
+Status SaveRig(const fs::path& dir, const std::string& text) {
+  const fs::path place = dir / kSavedRigFile;
+  const Result<std::string> there = Exists(place) ? ReadFileBytes(place) : std::string();
+  return there && *there == text ? Status() : WriteFileWhole(place, text);
+}
+
 }  // namespace
 
 Result<SessionStore> SessionStore::Begin(const fs::path& dir, const fs::path& rig_file,
                                          const CaptureOptions& options) {
   Result<Rig> rig = CheckBegin(dir, rig_file, options);
   const Result<std::string> rig_text = rig ? ReadFileBytes(rig_file) : tl::unexpected(rig.error());
-  const Status made = rig_text ? MakeFolder(dir / "frames") : tl::unexpected(rig_text.error());
+  const Status made = rig_text ? MakeFolder(dir / kFramesFolder) : tl::unexpected(rig_text.error());
   if (!made) {
     return tl::unexpected(made.error());
   }
@@ -45,12 +68,13 @@ Result<SessionStore> SessionStore::Begin(const fs::path& dir, const fs::path& ri
     return tl::unexpected(writer.error());
   }
   // Again, now that no other program can begin here; then what was there goes.
-  const Status ready =
-      CheckBegin(dir, rig_file, options)
-          .and_then([&](const Rig&) { return writer->Keep(0); })
-          .and_then([&] { return WriteFileWhole(dir / kSavedRigFile, *rig_text); });
-  if (!ready) {
-    return tl::unexpected(ready.error());
+  const Status ready = CheckBegin(dir, rig_file, options)
+                           .map([&](const Rig&) { RemoveBegun(dir); })
+                           .and_then([&] { return writer->Keep(0); })
+                           .and_then([&] { return SaveRig(dir, *rig_text); });
+  Result<OwnFolder> incoming = ready ? MakeIncoming(dir) : tl::unexpected(ready.error());
+  if (!incoming) {
+    return tl::unexpected(incoming.error());
   }
   const Journal journal{.begun = {.kind = options.kind,
                                   .rig = kSavedRigFile,
@@ -63,7 +87,7 @@ Result<SessionStore> SessionStore::Begin(const fs::path& dir, const fs::path& ri
   if (const Status begun = writer->Begin(journal.begun); !begun) {
     return tl::unexpected(begun.error());
   }
-  return SessionStore(dir, *std::move(rig), journal, *std::move(writer));
+  return SessionStore(dir, *std::move(rig), journal, *std::move(writer), *std::move(incoming));
 }
 
 Result<SessionStore> SessionStore::Resume(const fs::path& dir) {
@@ -78,7 +102,18 @@ Result<SessionStore> SessionStore::Resume(const fs::path& dir) {
   if (const Status kept = writer->Keep(journal->whole_bytes); !kept) {
     return tl::unexpected(kept.error());
   }
-  return SessionStore(dir, *std::move(rig), *std::move(journal), *std::move(writer));
+  std::optional<OwnFolder> incoming;
+  if (journal->complete) {
+    OwnFolder::Abandoned(dir, kIncoming).clear();
+  } else {
+    Result<OwnFolder> made = MakeIncoming(dir);
+    if (!made) {
+      return tl::unexpected(made.error());
+    }
+    incoming.emplace(*std::move(made));
+  }
+  return SessionStore(dir, *std::move(rig), *std::move(journal), *std::move(writer),
+                      std::move(incoming));
 }
 
 Session SessionOf(const Journal& journal) {
@@ -93,11 +128,13 @@ Session SessionOf(const Journal& journal) {
   return session;
 }
 
-SessionStore::SessionStore(fs::path dir, Rig rig, Journal journal, JournalWriter writer)
+SessionStore::SessionStore(fs::path dir, Rig rig, Journal journal, JournalWriter writer,
+                           std::optional<OwnFolder> incoming)
     : dir_(std::move(dir)),
       rig_(std::move(rig)),
       journal_(std::move(journal)),
       writer_(std::move(writer)),
+      incoming_(std::move(incoming)),
       is_new_(journal_.done.size()) {}
 
 FrameFile SessionStore::FileOf(const SessionFrame& frame) const {
@@ -130,8 +167,25 @@ Status SessionStore::SetPlan(FramePlan plan, const std::string& reason,
   });
 }
 
+const fs::path& SessionStore::Incoming() const {
+  SATEEN_CHECK(incoming_.has_value());
+  return incoming_->Path();
+}
+
+Status SessionStore::BeginFrame(std::size_t frame) {
+  return CheckFrameName(dir_, journal_, frame)
+      .and_then([&] { return writer_.FrameBegun(frame); })
+      .map([&] { journal_.begun_names.insert(FileNameOf(frame, journal_.plan[frame], {})); });
+}
+
 Status SessionStore::Place(const fs::path& delivered, const fs::path& place) {
   std::error_code error;
+  const fs::file_type there = fs::symlink_status(place, error).type();
+  if (there != fs::file_type::not_found && there != fs::file_type::regular) {
+    return Fail(ErrorCode::kInvalidArgument,
+                "{}: is a link or a folder where a frame must go; move it away", place.string());
+  }
+  error.clear();
   fs::rename(delivered, place, error);
   if (error) {
     return Fail(ErrorCode::kIo, "{}: cannot move the frame here: {}", place.string(),
@@ -177,33 +231,18 @@ Status SessionStore::VerifyDone() {
   return {};
 }
 
-// Removes frames of an earlier plan, which had other names.
-void SessionStore::RemoveOtherFrames() const {
-  std::error_code ignored;
-  for (const auto& entry : fs::directory_iterator(dir_ / "frames", ignored)) {
-    const std::string file = (fs::path("frames") / entry.path().filename()).string();
-    const bool is_ours = std::ranges::any_of(
-        journal_.done, [&](const auto& frame) { return frame && frame->file == file; });
-    if (!is_ours) {
-      fs::remove(entry.path(), ignored);
-    }
-  }
-}
-
 Status SessionStore::Complete(const Session& session) {
   if (!journal_.complete) {
-    RemoveOtherFrames();
+    RemoveFormerFrames(dir_, journal_);
+    NameOtherFiles(dir_, journal_);
     if (Status completed = writer_.Complete(); !completed) {
       return completed;
     }
     journal_.complete = true;
   }
-  if (Status written = WriteFileWhole(dir_ / kSessionFile, SessionToJson(session)); !written) {
-    return written;
-  }
-  std::error_code ignored;
-  fs::remove_all(Incoming(), ignored);
-  return {};
+  return CheckNoLinks(dir_)
+      .and_then([&] { return WriteFileWhole(dir_ / kSessionFile, SessionToJson(session)); })
+      .map([&] { incoming_.reset(); });
 }
 
 }  // namespace sateen

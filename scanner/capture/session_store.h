@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/error.h"
+#include "core/own_folder.h"
 #include "rig/rig.h"
 #include "scanner/capture/capture_options.h"
 #include "scanner/capture/frame_plan.h"
@@ -16,16 +17,16 @@
 
 namespace sateen {
 
-// Folder in a session that the camera delivers into, while it is captured.
-inline constexpr const char* kIncoming = ".sateen-incoming";
-
 /// The folder of one session while it is captured, and its journal. What has been recorded is on
 /// the disk when a function returns.
 ///
 ///     rig.json          the rig as it was, byte for byte
 ///     journal.jsonl     what was done (scanner/capture/journal.h)
-///     .sateen-incoming/ where the camera delivers; whatever is left there is removed
-///     frames/           00-dark.dng, 01-led-0.dng ...: renamed from there when on the disk
+///     .sateen-incoming-XXXXXX/
+///                       where the camera delivers (OwnFolder); one that was left by a killed run
+///                       is removed
+///     frames/           00-dark.dng, 01-led-0.dng ...: renamed from there when on the disk. What the
+///                       journal did not begin is not touched (scanner/capture/own_frames.h)
 ///     session.json      last, when every frame is there and checked
 ///
 ///     state      entered by                 legal
@@ -46,7 +47,8 @@ class SessionStore {
   [[nodiscard]] static Result<SessionStore> Resume(const std::filesystem::path& dir);
 
   [[nodiscard]] const std::filesystem::path& Folder() const { return dir_; }
-  [[nodiscard]] std::filesystem::path Incoming() const { return dir_ / kIncoming; }
+  // Returns the folder that the camera delivers into; until the session is complete.
+  [[nodiscard]] const std::filesystem::path& Incoming() const;
   [[nodiscard]] const Rig& GetRig() const { return rig_; }
   [[nodiscard]] const Journal& Record() const { return journal_; }
   [[nodiscard]] FrameFile FileOf(const SessionFrame& frame) const;
@@ -59,7 +61,8 @@ class SessionStore {
   // Records the plan; all its frames are open. A new exposure takes the place of the journal's.
   [[nodiscard]] Status SetPlan(FramePlan plan, const std::string& reason,
                                const PlannedExposure& exposure = {});
-  [[nodiscard]] Status BeginFrame(std::size_t frame) { return writer_.FrameBegun(frame); }
+  // kInvalidArgument: a file that is not of this capture has the frame's place.
+  [[nodiscard]] Status BeginFrame(std::size_t frame);
   // Moves the delivered file to where the record says, and records the frame as done.
   [[nodiscard]] Status KeepFrame(std::size_t frame, SessionFrame record,
                                  const std::filesystem::path& delivered);
@@ -68,21 +71,23 @@ class SessionStore {
   // Rejects the done frames whose files have gone or changed. kIo, kBadData: the session is
   // complete.
   [[nodiscard]] Status VerifyDone();
-  // Removes frames of earlier plans, completes the journal and writes `session` to session.json.
+  // Removes frames of earlier plans, names files that are not of this capture, completes the
+  // journal and writes `session` to session.json.
   [[nodiscard]] Status Complete(const Session& session);
   [[nodiscard]] bool HasSessionJson() const;
 
  private:
-  SessionStore(std::filesystem::path dir, Rig rig, Journal journal, JournalWriter writer);
+  SessionStore(std::filesystem::path dir, Rig rig, Journal journal, JournalWriter writer,
+               std::optional<OwnFolder> incoming);
   [[nodiscard]] Status Place(const std::filesystem::path& delivered,
                              const std::filesystem::path& place);
-  void RemoveOtherFrames() const;
 
   std::filesystem::path dir_;
   Rig rig_;
   Journal journal_;
   JournalWriter writer_;
-  std::vector<bool> is_new_;  // [frame of the plan]: done, and taken by this object
+  std::optional<OwnFolder> incoming_;  // absent once the session is complete
+  std::vector<bool> is_new_;           // [frame of the plan]: done, and taken by this object
   int rejected_ = 0;
 };
 

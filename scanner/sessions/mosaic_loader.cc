@@ -46,18 +46,30 @@ class MemoryStore final : public MosaicStore {
   std::vector<Image<uint16_t>> mosaics_;
 };
 
+// Opens a new file that never has a name or, on disks that cannot do this, loses it at once.
+int OpenNameless(const fs::path& dir) {
+  const int fd = open(dir.c_str(), O_TMPFILE | O_RDWR | O_CLOEXEC, 0600);
+  if (fd >= 0 || (errno != EOPNOTSUPP && errno != EISDIR)) {
+    return fd;
+  }
+  std::string name = (dir / ".sateen-mosaics-XXXXXX").string();
+  const int named = mkostemp(name.data(), O_CLOEXEC);
+  if (named >= 0) {
+    unlink(name.c_str());
+  }
+  return named;
+}
+
 // A file that has no name, so that nothing of it is left whatever happens.
 class FileStore final : public MosaicStore {
  public:
   static Result<std::unique_ptr<FileStore>> Open(const fs::path& dir, ImageSize size_px,
                                                  size_t frames) {
-    std::string name = (dir / ".sateen-mosaics-XXXXXX").string();
-    const int fd = mkostemp(name.data(), O_CLOEXEC);
+    const int fd = OpenNameless(dir);
     if (fd < 0) {
       return Fail(ErrorCode::kIo, "{}: a scratch file cannot be created here: {}", dir.string(),
                   std::generic_category().message(errno));
     }
-    unlink(name.c_str());
     auto store = std::unique_ptr<FileStore>(new FileStore(fd, dir, size_px));
     const auto bytes = static_cast<off_t>(sizeof(uint16_t) * size_px.PixelCount() * frames);
     // Here, and not in the middle of the decoding.

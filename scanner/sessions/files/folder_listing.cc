@@ -60,6 +60,17 @@ bool Exists(const fs::path& path) {
   return fs::exists(path, ignored);
 }
 
+bool LeadsOutOf(const fs::path& dir, const fs::path& name) {
+  const auto is_outside = [](const fs::path& relative) {
+    return relative.empty() || relative.is_absolute() || *relative.begin() == "..";
+  };
+  std::error_code failed;
+  const fs::path base = fs::weakly_canonical(dir, failed);
+  const fs::path place = failed ? base : fs::weakly_canonical(dir / name, failed);
+  return failed || is_outside(name.lexically_normal()) ||
+         is_outside(place.lexically_relative(base));
+}
+
 std::string LowerCase(std::string_view text) {
   std::string lower(text);
   for (char& c : lower) {

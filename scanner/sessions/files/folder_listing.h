@@ -38,6 +38,10 @@ namespace sateen {
 // Returns false also where the path cannot be looked at; reading it will then say why.
 [[nodiscard]] bool Exists(const std::filesystem::path& path);
 
+// Returns whether `name`, relative to `dir`, names or leads to something outside of `dir`: an
+// absolute path, one with too many "..", or a link on the way.
+[[nodiscard]] bool LeadsOutOf(const std::filesystem::path& dir, const std::filesystem::path& name);
+
 // Converts ASCII only: enough for the file name endings and words that we look for.
 [[nodiscard]] std::string LowerCase(std::string_view text);
 

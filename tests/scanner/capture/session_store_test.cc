@@ -2,9 +2,11 @@
 
 #include <gmock/gmock.h>
 
+#include "core/notice.h"
 #include "core/sha256.h"
 #include "scanner/capture/session_folder.h"
 #include "tests/scanner/sessions/dataset_files.h"
+#include "tests/testing/tree.h"
 
 namespace sateen::session_store_test {
 namespace {
@@ -54,9 +56,9 @@ TEST_F(SessionStoreTest, KeepsFramesAndResumesWithThem) {
     Keep(store, 2);
     EXPECT_THAT(store.Open(), ElementsAre(1, 3, 4, 5, 6));
     EXPECT_EQ(store.Taken(), 2);
+    EXPECT_FALSE(fs::exists(store.Incoming() / "02"));
   }
   EXPECT_TRUE(fs::exists(dir_ / "frames/02-west.dng"));
-  EXPECT_FALSE(fs::exists(dir_ / kIncoming / "02"));
   const Result<SessionStore> resumed = SessionStore::Resume(dir_);
   ASSERT_TRUE(resumed) << resumed.error().message;
   EXPECT_THAT(resumed->Open(), ElementsAre(1, 3, 4, 5, 6));
@@ -78,12 +80,12 @@ TEST_F(SessionStoreTest, CompletesWithSessionJsonAndNothingElse) {
   {
     SessionStore store = Begin();
     KeepAll(store);
-    testing::WriteText(dir_ / "frames/99-led-7.dng", "of an earlier plan");
+    const fs::path incoming = store.Incoming();
+    EXPECT_TRUE(fs::is_directory(incoming));
     EXPECT_FALSE(store.HasSessionJson());
     EXPECT_TRUE(store.Complete(SessionOf(store.Record())));
     EXPECT_TRUE(store.HasSessionJson());
-    EXPECT_FALSE(fs::exists(dir_ / "frames/99-led-7.dng"));
-    EXPECT_FALSE(fs::exists(store.Incoming()));
+    EXPECT_FALSE(fs::exists(incoming));
   }
   testing::WriteText(dir_ / "frames/01-east.dng", "another");
   SessionStore complete = SessionStore::Resume(dir_).value();
@@ -103,6 +105,117 @@ TEST_F(SessionStoreTest, ANewPlanOpensAllFramesAndRecordsItsExposure) {
     EXPECT_EQ(store.Record().begun.exposure_s, 0.2);
   }
   EXPECT_EQ(SessionStore::Resume(dir_)->Record().begun.exposure_s, 0.2);
+}
+
+// Plans of several exposures have other names, and more of them.
+TEST_F(SessionStoreTest, CompletingRemovesFramesOfEarlierPlans) {
+  {
+    SessionStore store = SessionStore::Begin(dir_, rig_file_, {}).value();
+    ASSERT_TRUE(store.SetPlan(PlanOf(store.GetRig(), {0.1, 0.8}), "found"));
+    KeepAll(store);
+    ASSERT_TRUE(fs::exists(dir_ / "frames/09-east-again.dng"));
+  }
+  SessionStore store = SessionStore::Resume(dir_).value();
+  ASSERT_TRUE(store.SetPlan(PlanOf(store.GetRig(), {0.1}), "as asked"));
+  KeepAll(store);
+
+  ASSERT_TRUE(store.Complete(SessionOf(store.Record())));
+
+  EXPECT_THAT(testing::Listing(dir_ / "frames"),
+              ElementsAre("00-dark.dng", "01-east.dng", "02-west.dng", "03-north.dng",
+                          "04-south.dng", "05-east-again.dng", "06-dark.dng"));
+}
+
+TEST_F(SessionStoreTest, WhatItsJournalDidNotBeginIsNamedOnceAndLeft) {
+  std::vector<std::string> notices;
+  const NoticesTo here([&](const std::string& text) { notices.push_back(text); });
+  const fs::path far = temp_.Path() / "far";
+  testing::WriteText(far / "03-north.dng", "mine");
+  SessionStore store = Begin();
+  const fs::path frames = dir_ / "frames";
+  testing::WriteText(frames / "notes.txt", "mine");
+  testing::WriteText(frames / "99-led-7.dng", "mine");
+  testing::WriteText(frames / "00-dark.jpg", "mine");
+  testing::WriteText(frames / "folder/01-east.dng", "mine");
+  fs::create_symlink(far / "03-north.dng", frames / "07-north.dng");
+  fs::create_directory_symlink(far, frames / "link");
+  KeepAll(store);
+
+  ASSERT_TRUE(store.Complete(SessionOf(store.Record())));
+
+  EXPECT_THAT(notices,
+              ElementsAre(frames.string() +
+                          ": 6 entries are not of this capture and left alone: 00-dark.jpg, "
+                          "07-north.dng, 99-led-7.dng, folder, link and 1 more"));
+  EXPECT_EQ(testing::Listing(frames).size(), 7 + 7U);
+  EXPECT_EQ(testing::ReadText(far / "03-north.dng"), "mine");
+}
+
+TEST_F(SessionStoreTest, AFrameDoesNotTakeThePlaceOfAnotherFile) {
+  SessionStore store = Begin();
+  const fs::path place = dir_ / "frames/01-east.dng";
+  testing::WriteText(place, "mine");
+  EXPECT_THAT(store.BeginFrame(1).error(),
+              IsError(ErrorCode::kInvalidArgument,
+                      place.string() +
+                          ": is not of this capture and has the place of its frame 2; move it"));
+  fs::remove(place);
+  testing::WriteText(temp_.Path() / "far", "mine");
+  fs::create_symlink(temp_.Path() / "far", place);
+  EXPECT_THAT(store.BeginFrame(1).error(), IsError(ErrorCode::kInvalidArgument, "not of this"));
+  fs::remove(place);
+  ASSERT_TRUE(store.BeginFrame(1));
+  fs::create_symlink(temp_.Path() / "far", place);  // between the begin and the end of it
+  SessionFrame record = store.Record().plan[1];
+  record.file = "frames/01-east.dng";
+  EXPECT_THAT(store.KeepFrame(1, record, store.Incoming() / "01/DSC.DNG").error(),
+              IsError(ErrorCode::kInvalidArgument, "01-east.dng: is a link or a folder where"));
+  EXPECT_EQ(testing::ReadText(temp_.Path() / "far"), "mine");
+}
+
+// Killed after the first frame was put in place and before the journal said so.
+TEST_F(SessionStoreTest, BeginningAgainRemovesWhatTheFormerJournalBegan) {
+  {
+    SessionStore store = Begin();
+    ASSERT_TRUE(store.BeginFrame(0));
+    testing::WriteText(dir_ / "frames/00-dark.dng", "half");
+    testing::WriteText(store.Incoming() / "00-1/DSC.DNG", "half");
+  }
+  SessionStore store = Begin();
+  EXPECT_FALSE(fs::exists(dir_ / "frames/00-dark.dng"));
+  Keep(store, 0);
+}
+
+TEST_F(SessionStoreTest, LinksInPlaceOfItsOwnFilesAreRefused) {
+  const fs::path far = temp_.Path() / "far";
+  testing::WriteText(far / "file", "");
+  for (const char* name : {"frames", "journal.jsonl", "session.json", "rig.json"}) {
+    fs::create_directories(dir_);
+    fs::create_symlink(name == std::string("frames") ? far : far / "new", dir_ / name);
+    const std::string words = (dir_ / name).string() + ": is a link, and a session holds its own";
+    EXPECT_THAT(CheckBegin(dir_, rig_file_, {}).error(),
+                IsError(ErrorCode::kInvalidArgument, words));
+    EXPECT_THAT(CheckResume(dir_).error(), IsError(ErrorCode::kInvalidArgument, words));
+    EXPECT_THAT(JournalWriter::Open(dir_).has_value(), name != std::string("journal.jsonl"));
+    fs::remove_all(dir_);
+  }
+  EXPECT_THAT(testing::Listing(far), ElementsAre("file"));
+}
+
+TEST_F(SessionStoreTest, AnotherRigInTheFolderIsNotReplaced) {
+  const fs::path there = dir_ / "rig.json";
+  Rig another = testing::FourLights();
+  another.lights.pop_back();
+  testing::WriteText(there, RigToJson(another));
+  EXPECT_THAT(SessionStore::Begin(dir_, rig_file_, {}).error(),
+              IsError(ErrorCode::kInvalidArgument,
+                      there.string() + ": is another rig than " + rig_file_.string()));
+  EXPECT_EQ(testing::ReadText(there), RigToJson(another));
+  EXPECT_THAT(testing::Listing(dir_), ElementsAre("rig.json"));
+
+  EXPECT_TRUE(SessionStore::Begin(dir_, there, {})) << "the very rig that is there";
+  EXPECT_TRUE(SessionStore::Begin(dir_, rig_file_, {})) << "the copy of a capture without a frame";
+  EXPECT_EQ(testing::ReadText(there), testing::ReadText(rig_file_));
 }
 
 TEST_F(SessionStoreTest, IsLockedWhileItLives) {

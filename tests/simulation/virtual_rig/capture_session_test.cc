@@ -10,12 +10,14 @@
 #include "scanner/sessions/dataset.h"
 #include "tests/scanner/sessions/dataset_files.h"
 #include "tests/simulation/virtual_rig/capture_fakes.h"
+#include "tests/testing/tree.h"
 
 // A capture on the real firmware in simulated time.
 namespace sateen::testing::capture_session_test {
 namespace {
 
 namespace fs = std::filesystem;
+using ::testing::Contains;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::Not;
@@ -71,7 +73,7 @@ TEST_F(CaptureTest, TakesEveryFrameOfThePlanByItsOwnLight) {
     EXPECT_EQ(records[k].times_on, k == 0 ? 2 : 1) << k;
   }
   EXPECT_EQ(*VerifySession(dir_, {}), 14);  // 13 frames and the rig
-  EXPECT_FALSE(fs::exists(dir_ / kIncoming));
+  EXPECT_THAT(Listing(dir_), Not(Contains(HasSubstr(".sateen"))));
   // Frames that solves read: each is the picture of its light, to the noise of a site.
   const Dataset dataset = MustRead(dir_);
   ASSERT_THAT(dataset.stack, SizeIs(10));
@@ -193,7 +195,7 @@ TEST_F(CaptureTest, BracketsAScene) {
     EXPECT_EQ(ErrorOf(killed->Run(*host_, camera, {.threads = 1, .cancel = &cancel})).code,
               ErrorCode::kCancelled);
   }
-  WriteText(dir_ / "frames" / "02-led-9.dng", "of another plan");
+  WriteText(dir_ / "frames" / "02-led-9.dng", "of nobody's plan");
   camera.on_exposed = {};
   Result<CaptureSession> session = CaptureSession::Resume(dir_, options);
   ASSERT_TRUE(session) << session.error().message;
@@ -202,7 +204,7 @@ TEST_F(CaptureTest, BracketsAScene) {
   EXPECT_THAT(summary->session.frames, SizeIs(2 + 3 * 10 + 1));
   EXPECT_GT(summary->kept, 0);
   EXPECT_EQ(*summary->session.frames[0].exposure_s, *summary->session.frames[3].exposure_s);
-  EXPECT_FALSE(fs::exists(dir_ / "frames" / "02-led-9.dng"));
+  EXPECT_TRUE(fs::exists(dir_ / "frames" / "02-led-9.dng"));
   EXPECT_TRUE(VerifySession(dir_, {}));
   EXPECT_THAT(MustRead(dir_).stack, SizeIs(10));
 }
@@ -477,6 +479,30 @@ TEST_F(CaptureTest, VerifyNamesEachDamage) {
   expect(replace("journal.jsonl", "{\"record\":\"complete\"}\n", ""),
          "continue it: sateen capture --resume");
   expect([&] { fs::remove(dir_ / "journal.jsonl"); }, "journal.jsonl: is missing");
+  const auto lead_out = [&](const char* name) {
+    return [this, name] {
+      const fs::path far = temp_.Path() / "far" / name;
+      fs::create_directories(far.parent_path());
+      fs::remove_all(far);
+      fs::rename(dir_ / name, far);
+      fs::create_symlink(far, dir_ / name);
+    };
+  };
+  expect(lead_out("frames/05-led-4.dng"), "frames/05-led-4.dng lies outside of the session");
+  expect(lead_out("frames"), "frames/00-dark.dng lies outside of the session");
+  expect(lead_out("rig.json"), "rig.json lies outside of the session");
+  const auto name_outside = [&](const std::string& place) {
+    return [this, place] {
+      Session session = *ReadSessionRecord(dir_);
+      session.frames[5].file = place;
+      WriteText(dir_ / "session.json", SessionToJson(session));
+    };
+  };
+  for (const fs::path& place :
+       {dir_ / "frames/05-led-4.dng", fs::path("../twill/frames/05-led-4.dng"),
+        fs::path("frames/../../twill/frames/05-led-4.dng")}) {
+    expect(name_outside(place), place.string() + " lies outside of the session");
+  }
   // Captures of before did not name their journal.
   fs::remove_all(dir_);
   ASSERT_TRUE(Begin());
