@@ -47,7 +47,11 @@ Result<std::filesystem::path> ReplaceFile(const std::filesystem::path& path,
     const std::string stem = path.stem().string() + "-" + TimeText("%Y%m%dT%H%M%SZ");
     former = path;
     former.replace_filename(stem + path.extension().string());
-    for (int again = 2; std::filesystem::exists(former, error); ++again) {
+    const auto is_taken = [&] {  // by a link that leads nowhere, too
+      return std::filesystem::symlink_status(former, error).type() !=
+             std::filesystem::file_type::not_found;
+    };
+    for (int again = 2; is_taken(); ++again) {
       former.replace_filename(fmt::format("{}-{}{}", stem, again, path.extension().string()));
     }
     if (Status status = WriteFileWhole(former, *kept); !status) {

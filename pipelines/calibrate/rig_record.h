@@ -23,7 +23,8 @@ namespace sateen {
     const std::filesystem::path& rig_file, const std::filesystem::path& output);
 
 // Writes the file whole. Keeps a file that is there as a copy with date and time in its name, and
-// returns the copy's path; empty where there was none.
+// returns the copy's path; empty where there was none. Where `path` is a link, the file that it
+// leads to is replaced, and the copy lies beside the link.
 [[nodiscard]] Result<std::filesystem::path> ReplaceFile(const std::filesystem::path& path,
                                                         const std::string& text);
 
