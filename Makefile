@@ -20,6 +20,7 @@ IMAGE_14 = sateen-controller.hex
 IMAGE_16 = sateen-controller-16.hex
 SECONDS ?= 60
 LABEL ?=
+KILLS ?= 60
 SEEDS ?= few
 SINCE ?=
 SCENES = twill-ring10 knit linen-three-rings satin-ggx knit-gloss black-velvet rib-shadows
@@ -28,7 +29,7 @@ CTEST = ctest --output-on-failure --no-tests=error -j$(JOBS)
 OUR_SOURCES = git ls-files -z --cached --others --exclude-standard '*.h' '*.cc' '*.c'
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo programs build test bench accuracy firmware flash fuzz mutants format format-check tidy asan tsan diagrams nightly clean
+.PHONY: help setup demo programs build test bench accuracy firmware flash fuzz mutants kills format format-check tidy asan tsan diagrams nightly clean
 
 help:  ## This list
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 16
@@ -106,6 +107,11 @@ tsan: setup  ## The tests of the daemon and the capture under the thread sanitiz
 	@for module in $(TSAN); do \
 	    TSAN_OPTIONS="suppressions=$(CURDIR)/tests/tsan.supp" $(CTEST) --test-dir build/tsan \
 	        -R "(^|/)$$module/" -E solve_job || exit 1; done
+
+kills: setup  ## kill -9 capture, resume, solve, simulate and calibrate at KILLS system calls each; 0: at all
+	@cmake --preset $(PRESET) --log-level=WARNING
+	@cmake --build --preset $(PRESET) -j$(JOBS) --target sateen_virtual_rig_test
+	@SATEEN_KILLS=$(KILLS) build/release/bin/sateen_virtual_rig_test --gtest_filter='ProgramKill.*'
 
 nightly: setup  ## All that there is: every test with all seeds, tidy, benches, fuzz, threads, mutants
 	@.ci/run nightly
