@@ -9,6 +9,7 @@
 # SECONDS  how long fuzz runs each target
 # LABEL   which tests "make test" builds and runs: all, or "release", those that depend on
 #         optimisation, SIMD or exact bits, or run the programs
+# KILLS   for kills: system calls of each program at which it is killed; 0: all
 # SEEDS   for asan: few, or all of the tests that average over random draws
 # SINCE   a commit: tidy looks at the modules that differ from it; all modules if empty
 JOBS ?= $(shell nproc)
