@@ -19,8 +19,8 @@
 
 #include "core/file_io.h"
 #include "core/output_folder.h"
-#include "core/parallel.h"
 #include "core/own_folder.h"
+#include "core/parallel.h"
 #include "core/sha256.h"
 #include "imaging/dng.h"
 #include "imaging/raw.h"

@@ -140,8 +140,8 @@ class AccuracyBench {
       return tl::unexpected(scene.error());
     }
     const Result<OwnFolder> scratch = MakeScratchFolder("bench-accuracy");
-    Result<OutputFolder> folder = scratch ? OutputFolder::Open(scratch->Path())
-                                          : tl::unexpected(scratch.error());
+    Result<OutputFolder> folder =
+        scratch ? OutputFolder::Open(scratch->Path()) : tl::unexpected(scratch.error());
     Status status =
         folder
             ? StageSimulatedSession(*scene, FrameFormat::kRawDng, Quiet(0), *folder).and_then([&] {

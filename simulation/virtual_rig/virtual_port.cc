@@ -85,9 +85,7 @@ VirtualPort::VirtualPort(VirtualPort&& other) noexcept
       in_use_(other.in_use_),
       bytes_lost_(other.bytes_lost_) {}
 
-VirtualPort::~VirtualPort() {
-  Unplug();
-}
+VirtualPort::~VirtualPort() { Unplug(); }
 
 Status VirtualPort::Plug() {
   if (Plugged()) {
