@@ -13,6 +13,9 @@
 namespace sateen {
 namespace {
 
+// How often an urgent job asks for the rig, which keeps it for that job meanwhile.
+constexpr std::chrono::milliseconds kAskAgain{500};
+
 // A whole number without a sign; nothing for other text.
 template <typename T>
 std::optional<T> WholeNumber(const std::string& text) {
@@ -257,27 +260,35 @@ ApiResponse Api::GetEvents(const ApiRequest& request, Parameter id) const {
 // Turns all lights off. For safety it is never refused for a job that runs: that job is cancelled,
 // and so is one that gets in between. It goes on when its client has left.
 ApiResponse Api::PostLightsOff(const ApiRequest& request, Parameter /*none*/) const {
+  using std::chrono::milliseconds;
   const auto deadline = std::chrono::steady_clock::now() + options_.off_wait;
+  std::optional<std::uint64_t> off;  // the job that turns them off, once it has begun
   while (true) {
-    const tl::expected<std::uint64_t, JobRefusal> off = service_.Begin(LightsOffJob(request.who));
-    if (!off && !off.error().holder) {
-      return RefusedBusy(off.error());
-    }
-    const std::uint64_t id = off ? *off : off.error().holder->id;
+    std::uint64_t id = off.value_or(0);
     if (!off) {
-      service_.Cancel(id, request.who);
+      const tl::expected<std::uint64_t, JobRefusal> begun =
+          service_.Begin(LightsOffJob(request.who));
+      if (!begun && !begun.error().holder) {
+        return RefusedBusy(begun.error());
+      }
+      id = begun ? *begun : begun.error().holder->id;
+      if (begun) {
+        off = id;
+      } else {
+        service_.Cancel(id, request.who);
+      }
     }
-    const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(
-        deadline - std::chrono::steady_clock::now());
-    const JobWait wait = service_.AwaitEnd(id, std::max(left, std::chrono::milliseconds(0)));
+    const auto left =
+        std::chrono::duration_cast<milliseconds>(deadline - std::chrono::steady_clock::now());
+    const JobWait wait = service_.AwaitEnd(id, std::clamp(left, milliseconds(0), kAskAgain));
     const JobRecord job = service_.Find(id).value_or(JobRecord{.id = id, .state = JobState::kDone});
     if (wait == JobWait::kBoardLost) {
       return Refused(503, {ErrorCode::kDevice, service_.State().lights_fault});
     }
-    if (wait == JobWait::kRunning) {
+    if (wait == JobWait::kRunning && left <= kAskAgain) {
       return {.status = 202, .body = JobJson(job)};
     }
-    if (off) {
+    if (wait == JobWait::kEnded && off) {
       return Ended(job);
     }
   }

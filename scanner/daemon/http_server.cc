@@ -116,22 +116,31 @@ class HttpServer::Impl {
 
   void Accept() {
     while (!stopping_) {
-      std::vector<pollfd> entries = {{.fd = listener_.Descriptor(), .events = POLLIN, .revents = 0},
-                                     {.fd = wake_, .events = POLLIN, .revents = 0}};
-      room_.AppendTo(entries);
-      poll(entries.data(), entries.size(), room_.WaitMs());
-      eventfd_t ended = 0;
-      eventfd_read(wake_, &ended);
-      JoinEnded();
-      room_.Serve();
-      for (auto urgent = room_.TakeUrgent(); urgent; urgent = room_.TakeUrgent()) {
-        if (!Begin(urgent->fd, /*urgent=*/true, urgent->begun)) {
-          room_.AddUrgent(*std::move(urgent));
-          break;
-        }
+      try {
+        AcceptAndServe();
+      } catch (const std::exception&) {
+        std::this_thread::sleep_for(kPause);  // out of memory
       }
-      for (int i = 0; i < kAcceptAtOnce && AcceptOne(); ++i) {
+    }
+  }
+
+  // Waits for the next thing that happens.
+  void AcceptAndServe() {
+    std::vector<pollfd> entries = {{.fd = listener_.Descriptor(), .events = POLLIN, .revents = 0},
+                                   {.fd = wake_, .events = POLLIN, .revents = 0}};
+    room_.AppendTo(entries);
+    poll(entries.data(), entries.size(), room_.WaitMs());
+    eventfd_t ended = 0;
+    eventfd_read(wake_, &ended);
+    JoinEnded();
+    room_.Serve();
+    for (auto urgent = room_.TakeUrgent(); urgent; urgent = room_.TakeUrgent()) {
+      if (!Begin(urgent->fd, /*urgent=*/true, urgent->begun)) {
+        room_.AddUrgent(*std::move(urgent));
+        break;
       }
+    }
+    for (int i = 0; i < kAcceptAtOnce && AcceptOne(); ++i) {
     }
   }
 

@@ -65,6 +65,8 @@ struct JobRequest {
   std::string owner;
   // False: the job needs neither board nor camera, and runs beside one that has the rig.
   bool needs_rig = true;
+  // True: where another job has the rig, this one is the next to get it.
+  bool urgent = false;
   JobWork work;
 };
 

@@ -158,13 +158,16 @@ JobRequest BoardJob(BoardChange change, std::string owner) {
 }
 
 JobRequest LightsOffJob(std::string owner) {
-  return {.kind = "lights off", .owner = std::move(owner), .work = DoLightsOff};
+  return {.kind = "lights off", .owner = std::move(owner), .urgent = true, .work = DoLightsOff};
 }
 
 JobRequest DevicesJob(std::string owner) {
   return {.kind = "devices", .owner = std::move(owner), .work = [](JobContext& job) {
             std::vector<DeviceReply> devices;
             AskBoard(devices, job.Devices());
+            if (const Status going = job.GetTask().CheckCancelled(); !going) {
+              return Result<std::string>(tl::unexpected(going.error()));
+            }
             AskCamera(devices, job.Devices());
             return Result<std::string>(DevicesJson(devices, /*indent=*/-1));
           }};

@@ -18,6 +18,8 @@ namespace {
 
 constexpr std::size_t kEventsKept = 1000;
 constexpr std::ptrdiff_t kEndedJobsKept = 20;
+// How long the rig is kept for an urgent job that found it in use, once it asks no more.
+constexpr std::chrono::seconds kKept{3};
 
 }  // namespace
 
@@ -89,6 +91,7 @@ class RigService::Impl {
   std::string lights_fault_;
   bool board_lost_ = false;  // the job that ends waits for a board that does not answer
   bool stopping_ = false;
+  std::chrono::steady_clock::time_point kept_until_;  // until then the rig is for urgent jobs
   Lane rig_;
   Lane desk_;  // lane of jobs without devices
 };
@@ -123,6 +126,14 @@ tl::expected<std::uint64_t, JobRefusal> RigService::Impl::Begin(JobRequest reque
         {.error = {ErrorCode::kDevice, "the daemon is ending; start it again"}});
   }
   Lane& lane = request.needs_rig ? rig_ : desk_;
+  const auto now = std::chrono::steady_clock::now();
+  if (request.needs_rig && !request.urgent && lane.running == nullptr && now < kept_until_) {
+    return tl::unexpected<JobRefusal>(
+        {.error = {ErrorCode::kDevice, "the lights are being turned off; try again"}});
+  }
+  if (request.urgent) {
+    kept_until_ = lane.running != nullptr ? now + kKept : now;
+  }
   if (lane.running != nullptr) {
     JobRefusal refusal = {.error = {ErrorCode::kDevice, BusyText(lane.running->record)}};
     refusal.holder = lane.running->record;

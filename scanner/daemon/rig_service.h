@@ -61,8 +61,8 @@ struct FollowedEvents {
 /// A job counts as running until its lights are off, so that no light is ever on while the state
 /// says that no job runs. Where the board answers, and does not say that all is off, the job has
 /// failed, whatever it did, and State() names the lights. Begin while a job runs is refused at once:
-/// the error names who has the rig and since when. There is no queue. All calls may come from any
-/// thread.
+/// the error names who has the rig and since when. There is no queue, but an urgent job, as turning
+/// the lights off, that was refused comes next if it asks again. All calls may come from any thread.
 ///
 /// A job that needs no devices, as a solve, runs in a thread of its own beside the job that has the
 /// rig: neither waits for the other. There is one such job at a time.

@@ -169,6 +169,23 @@ TEST(RigService, StopCancelsTurnsOffAndRefuses) {
   EXPECT_FALSE(refused.error().holder.has_value());
 }
 
+// However many others ask for the rig meanwhile.
+TEST(RigService, AnUrgentJobThatWasRefusedComesNext) {
+  FakeDaemon daemon;
+  const JobRequest idle = WorkJob([](JobContext&) -> Result<std::string> { return "{}"; });
+  const std::uint64_t light = daemon.TurnOn(3);
+  ASSERT_FALSE(daemon.service.Begin(LightsOffJob("alice")));
+  daemon.service.Cancel(light, "alice");
+  ASSERT_TRUE(daemon.service.WaitIdle(kLong));
+
+  const auto between = daemon.service.Begin(idle);
+  ASSERT_FALSE(between.has_value());
+  EXPECT_THAT(between.error().error.message, HasSubstr("being turned off"));
+  EXPECT_FALSE(between.error().holder.has_value());
+  EXPECT_TRUE(daemon.service.RunToEnd(LightsOffJob("alice")).has_value());
+  EXPECT_TRUE(daemon.service.RunToEnd(idle).has_value());
+}
+
 // A job without devices, that runs until it is cancelled.
 JobRequest DeskJob(const std::string& owner) {
   JobRequest job = WorkJob(

@@ -130,11 +130,13 @@ class StressClient {
     return Exchange(daemon_.socket, HttpRequest(method, path, body));
   }
 
-  // 503 with "too many" is a right answer to anything.
+  // 503 for either of two reasons is a right answer to anything.
   void Expect(const std::string& what, const std::string& answer, std::vector<int> statuses) {
     const int status = StatusOf(answer);
     ++counts.statuses[what][status];
-    statuses.push_back(answer.find("too many clients") == std::string::npos ? -1 : 503);
+    const bool may_be_refused = answer.find("too many clients") != std::string::npos ||
+                                answer.find("being turned off") != std::string::npos;
+    statuses.push_back(may_be_refused ? 503 : -1);
     const bool fits = std::ranges::find(statuses, status) != statuses.end();
     const bool is_json = status == 0 || answer.find("event-stream") != std::string::npos ||
                          nlohmann::json::accept(BodyOf(answer));
