@@ -11,6 +11,8 @@
 #include <utility>
 
 #include "core/file_io.h"
+#include "core/notice.h"
+#include "core/own_folder.h"
 
 namespace sateen {
 namespace {
@@ -177,6 +179,28 @@ ExchangeUndone UndoExchange(const fs::path& staging, const fs::path& dir) {
     }
   }
   return undone;
+}
+
+void CleanUpAfterKills(const fs::path& dir) {
+  for (OwnFolder& left : OwnFolder::Abandoned(dir, kStagingPrefix)) {
+    const ExchangeUndone undone = UndoExchange(left.Path(), dir);
+    if (undone.back > 0) {
+      Notice(
+          fmt::format("{}: an earlier run was killed while it put its files in place; the {} "
+                      "files from before it are back",
+                      dir.string(), undone.back));
+    }
+    for (const fs::path& kept : undone.kept) {
+      Notice(
+          fmt::format("{}: an earlier run was killed while it put its files in place, and "
+                      "another file has this file's place by now; move it where you need it, "
+                      "then remove {}",
+                      kept.string(), left.Path().string()));
+    }
+    if (!undone.kept.empty()) {
+      left.Keep();
+    }
+  }
 }
 
 Status FlushFolders(const std::vector<fs::path>& folders) {

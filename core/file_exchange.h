@@ -3,11 +3,15 @@
 #include <cstddef>
 #include <filesystem>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "core/error.h"
 
 namespace sateen {
+
+// Name of a staging folder (OwnFolder), but for its random end.
+inline constexpr std::string_view kStagingPrefix = ".sateen-";
 
 /// Files in a staging folder that take the places of those in a folder, all of them or none.
 ///
@@ -38,6 +42,10 @@ struct ExchangeUndone {
 // their places go; what else is there by now stays.
 [[nodiscard]] ExchangeUndone UndoExchange(const std::filesystem::path& staging,
                                           const std::filesystem::path& dir);
+
+// Removes the staging folders that killed runs left in `dir`, and puts back the files that one of
+// them had moved aside; a notice says so.
+void CleanUpAfterKills(const std::filesystem::path& dir);
 
 // Flushes the folders that can be read; others cannot be flushed either.
 [[nodiscard]] Status FlushFolders(const std::vector<std::filesystem::path>& folders);

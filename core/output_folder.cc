@@ -9,14 +9,11 @@
 
 #include "core/check.h"
 #include "core/file_exchange.h"
-#include "core/notice.h"
 
 namespace sateen {
 namespace {
 
 namespace fs = std::filesystem;
-
-constexpr std::string_view kStaging = ".sateen-";
 
 fs::path ParentOf(const fs::path& path) {
   return path.has_parent_path() ? path.parent_path() : fs::path(".");
@@ -69,29 +66,6 @@ Status CheckPlace(const fs::path& dir, const std::string& name) {
   return {};
 }
 
-// Puts back what lies in staging folders of runs that were killed, and removes these. Says so.
-void CleanUp(const fs::path& dir) {
-  for (OwnFolder& left : OwnFolder::Abandoned(dir, kStaging)) {
-    const ExchangeUndone undone = UndoExchange(left.Path(), dir);
-    if (undone.back > 0) {
-      Notice(
-          fmt::format("{}: an earlier run was killed while it put its files in place; the {} "
-                      "files from before it are back",
-                      dir.string(), undone.back));
-    }
-    for (const fs::path& kept : undone.kept) {
-      Notice(
-          fmt::format("{}: an earlier run was killed while it put its files in place, and "
-                      "another file has this file's place by now; move it where you need it, "
-                      "then remove {}",
-                      kept.string(), left.Path().string()));
-    }
-    if (!undone.kept.empty()) {
-      left.Keep();
-    }
-  }
-}
-
 }  // namespace
 
 Result<OutputFolder> OutputFolder::Open(const fs::path& dir) {
@@ -103,8 +77,8 @@ Result<OutputFolder> OutputFolder::Open(const fs::path& dir) {
   if (Status made = MakeFolders(dir, folder.created_); !made) {
     return tl::unexpected(made.error());
   }
-  CleanUp(dir);
-  Result<OwnFolder> staging = OwnFolder::Make(dir, kStaging);
+  CleanUpAfterKills(dir);
+  Result<OwnFolder> staging = OwnFolder::Make(dir, kStagingPrefix);
   if (!staging) {
     return tl::unexpected(staging.error());
   }
@@ -204,8 +178,8 @@ Status WriteFileWhole(const fs::path& path, const std::string& text) {
     return Fail(ErrorCode::kIo, "{}: is a device or a pipe; give the name of a file",
                 path.string());
   }
-  CleanUp(ParentOf(target));
-  const Result<OwnFolder> staging = OwnFolder::Make(ParentOf(target), kStaging);
+  CleanUpAfterKills(ParentOf(target));
+  const Result<OwnFolder> staging = OwnFolder::Make(ParentOf(target), kStagingPrefix);
   if (!staging) {
     return tl::unexpected(staging.error());
   }

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "core/check.h"
+#include "core/file_exchange.h"
 #include "core/file_io.h"
 #include "core/output_folder.h"
 #include "core/sha256.h"
@@ -31,10 +32,10 @@ Status MakeFolder(const fs::path& path) {
 
 constexpr std::string_view kIncoming = ".sateen-incoming-";
 
-// Makes the folder that the camera delivers into. Removes the one that a killed capture left.
-Result<OwnFolder> MakeIncoming(const fs::path& dir) {
+// Removes what a killed capture left hidden.
+void CleanUp(const fs::path& dir) {
   OwnFolder::Abandoned(dir, kIncoming).clear();
-  return OwnFolder::Make(dir, kIncoming);
+  CleanUpAfterKills(dir);
 }
 
 // Removes the frames of a journal that is begun again.
@@ -69,10 +70,14 @@ Result<SessionStore> SessionStore::Begin(const fs::path& dir, const fs::path& ri
   }
   // Again, now that no other program can begin here; then what was there goes.
   const Status ready = CheckBegin(dir, rig_file, options)
-                           .map([&](const Rig&) { RemoveBegun(dir); })
+                           .map([&](const Rig&) {
+                             CleanUp(dir);
+                             RemoveBegun(dir);
+                           })
                            .and_then([&] { return writer->Keep(0); })
                            .and_then([&] { return SaveRig(dir, *rig_text); });
-  Result<OwnFolder> incoming = ready ? MakeIncoming(dir) : tl::unexpected(ready.error());
+  Result<OwnFolder> incoming =
+      ready ? OwnFolder::Make(dir, kIncoming) : tl::unexpected(ready.error());
   if (!incoming) {
     return tl::unexpected(incoming.error());
   }
@@ -103,10 +108,9 @@ Result<SessionStore> SessionStore::Resume(const fs::path& dir) {
     return tl::unexpected(kept.error());
   }
   std::optional<OwnFolder> incoming;
-  if (journal->complete) {
-    OwnFolder::Abandoned(dir, kIncoming).clear();
-  } else {
-    Result<OwnFolder> made = MakeIncoming(dir);
+  CleanUp(dir);
+  if (!journal->complete) {
+    Result<OwnFolder> made = OwnFolder::Make(dir, kIncoming);
     if (!made) {
       return tl::unexpected(made.error());
     }

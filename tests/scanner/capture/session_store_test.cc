@@ -1,6 +1,8 @@
 #include "scanner/capture/session_store.h"
 
 #include <gmock/gmock.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include "core/notice.h"
 #include "core/sha256.h"
@@ -184,6 +186,28 @@ TEST_F(SessionStoreTest, BeginningAgainRemovesWhatTheFormerJournalBegan) {
   SessionStore store = Begin();
   EXPECT_FALSE(fs::exists(dir_ / "frames/00-dark.dng"));
   Keep(store, 0);
+}
+
+// Killed after session.json had its name and before the hidden folders were gone.
+TEST_F(SessionStoreTest, ResumingACompleteSessionRemovesWhatAKilledRunLeft) {
+  {
+    SessionStore store = Begin();
+    KeepAll(store);
+    ASSERT_TRUE(store.Complete(SessionOf(store.Record())));
+  }
+  const std::vector<std::string> complete = testing::Listing(dir_);
+  const pid_t child = fork();
+  if (child == 0) {
+    const OwnFolder staging = OwnFolder::Make(dir_, ".sateen-").value();
+    const OwnFolder incoming = OwnFolder::Make(dir_, ".sateen-incoming-").value();
+    _exit(0);
+  }
+  waitpid(child, nullptr, 0);
+  ASSERT_EQ(testing::Listing(dir_).size(), complete.size() + 4);
+
+  ASSERT_TRUE(SessionStore::Resume(dir_));
+
+  EXPECT_EQ(testing::Listing(dir_), complete);
 }
 
 TEST_F(SessionStoreTest, LinksInPlaceOfItsOwnFilesAreRefused) {
