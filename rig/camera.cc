@@ -2,8 +2,10 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cmath>
+#include <string>
+
+#include "rig/plausible.h"
 
 namespace sateen {
 namespace {
@@ -26,12 +28,15 @@ Status CheckPose(const Eigen::Isometry3d& pose, std::string_view what) {
                 "{}.table_from_camera: the last row is [{}]; need [0, 0, 0, 1]", what,
                 fmt::join(pose.matrix().row(3), ", "));
   }
-  if (!(pose.translation().allFinite() && pose.translation().z() > 0.0)) {
+  const Eigen::Vector3d at_mm = pose.translation();
+  const std::string place = fmt::format("{}.table_from_camera:", what);
+  if (!(at_mm.z() > 0.0)) {
     return Fail(ErrorCode::kBadData,
-                "{}.table_from_camera: the camera is at z = {:.6g} mm; need z > 0, above the table",
-                what, pose.translation().z());
+                "{} the camera is at z = {:.6g} mm; need z > 0, above the table", place, at_mm.z());
   }
-  return {};
+  return CheckPlausible(place, " the camera's x or y", {at_mm.x(), at_mm.y()}, kPlausiblePlace)
+      .and_then(
+          [&] { return CheckPlausible(place, " the camera's z", {at_mm.z()}, kPlausibleHeight); });
 }
 
 }  // namespace
@@ -49,18 +54,23 @@ Status Camera::Validate(std::string_view what) const {
     return Fail(ErrorCode::kBadData, "{}.size_px: {} x {}; need 1 to {} each", what, size_px.width,
                 size_px.height, kMaxSizePx);
   }
-  if (!(std::isfinite(fx) && std::isfinite(fy) && fx > 0.0 && fy > 0.0)) {
+  if (!(fx > 0.0 && fy > 0.0)) {
     return Fail(ErrorCode::kBadData, "{}.k: fx = {:.6g}, fy = {:.6g}; need focal lengths > 0 px",
                 what, fx, fy);
   }
-  if (!(std::isfinite(cx) && std::isfinite(cy))) {
-    return Fail(ErrorCode::kBadData, "{}.k: cx = {:.6g}, cy = {:.6g}; need finite numbers", what,
-                cx, cy);
+  const auto [k1, k2, p1, p2, k3] = distortion;
+  Status status = CheckPlausible(what, ".k: fx or fy", {fx, fy}, kPlausibleFocal);
+  if (status) {
+    status = CheckPlausible(what, ".k: cx or cy", {cx, cy}, kPlausiblePrincipal);
   }
-  if (!std::all_of(distortion.begin(), distortion.end(),
-                   [](double k) { return std::isfinite(k); })) {
-    return Fail(ErrorCode::kBadData, "{}.distortion: [{}]; need finite numbers", what,
-                fmt::join(distortion, ", "));
+  if (status) {
+    status = CheckPlausible(what, ".distortion: k1, k2 or k3", {k1, k2, k3}, kPlausibleRadial);
+  }
+  if (status) {
+    status = CheckPlausible(what, ".distortion: p1 or p2", {p1, p2}, kPlausibleTangential);
+  }
+  if (!status) {
+    return status;
   }
   return has_pose ? CheckPose(table_from_camera, what) : Status();
 }

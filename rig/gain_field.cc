@@ -3,10 +3,14 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/whole_number.h"
+#include "rig/plausible.h"
+
 namespace sateen {
 namespace {
 
 constexpr int kFewestKnots = 4;
+constexpr double kLeastGain = 1e-9;
 constexpr double kMostGain = 100.0;
 constexpr double kLeastFall = 1e-3;  // share of the light's height
 
@@ -19,7 +23,8 @@ struct Cell {
 
 Cell CellAt(double at, int knots) {
   const double inside = std::clamp(at, 1.0, knots - 2.0);
-  const int cell = std::min(static_cast<int>(inside), knots - 3);
+  // A place that is no number, as of a light that a fit has lost, is in the first cell.
+  const int cell = std::clamp(ClampedTo<int>(inside), 1, knots - 3);
   const double t = inside - cell;
   const double s = 1.0 - t;
   Cell result{.first = cell - 1,
@@ -68,8 +73,17 @@ Status GainField::Validate(std::string_view what) const {
     return Fail(ErrorCode::kBadData, "{}: origin_mm is [{:g}, {:g}]; need finite numbers", what,
                 origin_mm.x(), origin_mm.y());
   }
-  if (!(spacing_mm > 0.0 && std::isfinite(spacing_mm))) {
-    return Fail(ErrorCode::kBadData, "{}: spacing_mm is {:g}; need a number > 0", what, spacing_mm);
+  Status place =
+      CheckPlausible(what, ": origin_mm", {origin_mm.x(), origin_mm.y()}, kPlausiblePlace);
+  if (place && !(spacing_mm > 0.0)) {
+    place =
+        Fail(ErrorCode::kBadData, "{}: spacing_mm is {:g}; need a number > 0", what, spacing_mm);
+  }
+  if (place) {
+    place = CheckPlausible(what, ": spacing_mm", {spacing_mm}, kPlausibleSpacing);
+  }
+  if (!place) {
+    return place;
   }
   if (std::min(columns, rows) < kFewestKnots || std::max(columns, rows) > kMostFieldKnots) {
     return Fail(ErrorCode::kBadData, "{}: has {} columns and {} rows; need {} to {} of each", what,
@@ -80,7 +94,7 @@ Status GainField::Validate(std::string_view what) const {
                 gain.size(), columns, rows, columns * rows);
   }
   for (const double value : gain) {
-    if (!(value > 0.0 && value <= kMostGain)) {
+    if (!(value >= kLeastGain && value <= kMostGain)) {
       return Fail(ErrorCode::kBadData, "{}: a gain is {:g}; need above 0 and up to {:g}", what,
                   value, kMostGain);
     }

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "rig/plausible.h"
+
 namespace sateen {
 namespace {
 
@@ -37,10 +39,20 @@ Status Light::Validate(std::string_view what) const {
     return Fail(ErrorCode::kBadData, "{}: direction {} has length {:.6g}; need a unit vector", what,
                 Show(direction), direction.norm());
   }
-  if (model != LightModel::kDistant && !(position_mm.allFinite() && position_mm.z() > 0.0)) {
-    return Fail(ErrorCode::kBadData,
-                "{}: position_mm {}; need finite numbers and z > 0 (the table)", what,
-                Show(position_mm));
+  if (model != LightModel::kDistant) {
+    if (!(position_mm.allFinite() && position_mm.z() > 0.0)) {
+      return Fail(ErrorCode::kBadData,
+                  "{}: position_mm {}; need finite numbers and z > 0 (the table)", what,
+                  Show(position_mm));
+    }
+    Status place = CheckPlausible(what, ": position_mm: x or y", {position_mm.x(), position_mm.y()},
+                                  kPlausiblePlace);
+    if (place) {
+      place = CheckPlausible(what, ": position_mm: z", {position_mm.z()}, kPlausibleHeight);
+    }
+    if (!place) {
+      return place;
+    }
   }
   if (IsLed(model) && !IsUnit(axis)) {
     return Fail(ErrorCode::kBadData, "{}: axis {} has length {:.6g}; need a unit vector", what,
@@ -56,12 +68,24 @@ Status Light::Validate(std::string_view what) const {
     }
   }
   if (!(flux_rgb.allFinite() && flux_rgb.minCoeff() > 0.0)) {
-    return Fail(ErrorCode::kBadData, "{}: intensity {}; need three finite numbers > 0", what,
-                Show(flux_rgb));
+    return Fail(ErrorCode::kBadData, "{}: flux_rgb or intensity {}; need three finite numbers > 0",
+                what, Show(flux_rgb));
+  }
+  if (Status flux = CheckPlausible(what, ": flux_rgb or intensity",
+                                   {flux_rgb.x(), flux_rgb.y(), flux_rgb.z()}, kPlausibleFlux);
+      !flux) {
+    return flux;
   }
   if (position_sd_mm && !(position_sd_mm->allFinite() && position_sd_mm->minCoeff() >= 0.0)) {
     return Fail(ErrorCode::kBadData, "{}: position_sd_mm {}; need three finite numbers >= 0", what,
                 Show(*position_sd_mm));
+  }
+  if (position_sd_mm) {
+    if (Status sd =
+            CheckPlausible(what, ": position_sd_mm", {position_sd_mm->maxCoeff()}, kPlausibleSd);
+        !sd) {
+      return sd;
+    }
   }
   if (direction_sd_deg && !(*direction_sd_deg >= 0.0 && *direction_sd_deg <= 90.0)) {
     return Fail(ErrorCode::kBadData, "{}: direction_sd_deg {:.6g}; need 0 to 90", what,

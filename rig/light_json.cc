@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace sateen {
 namespace {
@@ -42,7 +43,12 @@ Result<GainField> ReadField(JsonReader reader) {
   field.spacing_mm = reader.Number("spacing_mm");
   field.columns = reader.Integer("columns");
   field.rows = reader.Integer("rows");
-  // Counts that Validate() will refuse must not ask for that many numbers.
+  for (const auto& [key, count] :
+       {std::pair("columns", field.columns), std::pair("rows", field.rows)}) {
+    reader.Require(count >= 1 && count <= kMostFieldKnots, key,
+                   fmt::format("is {}; need 4 to {}", count, kMostFieldKnots));
+  }
+  // Counts that are refused must not ask for that many numbers.
   const int columns = std::clamp(field.columns, 0, kMostFieldKnots);
   const int rows = std::clamp(field.rows, 0, kMostFieldKnots);
   field.gain = reader.Numbers("gain", static_cast<size_t>(columns) * static_cast<size_t>(rows));

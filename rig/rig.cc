@@ -11,6 +11,7 @@
 #include "core/linear_algebra.h"
 #include "rig/calibration_json.h"
 #include "rig/light_json.h"
+#include "rig/plausible.h"
 
 namespace sateen {
 namespace {
@@ -20,6 +21,7 @@ using Json = nlohmann::json;
 // Below this a vector or rotation is exact but for rounding and stays as it is, so that reading
 // what was written changes no bit.
 constexpr double kRounding = 1e-14;
+constexpr int kMostChannel = 65535;
 
 // Returns the rotation nearest to one that a file has rounded.
 Eigen::Matrix3d NearestRotation(const Eigen::Matrix3d& r) {
@@ -100,31 +102,48 @@ nlohmann::ordered_json ResponseToJson(const Response& response) {
 }
 
 Status CheckResponse(const Response& response, std::string_view what) {
-  if (!(std::isfinite(response.white) && response.black >= 0.0 &&
-        response.black < response.white)) {
-    return Fail(ErrorCode::kBadData,
-                "{}: response has black = {:.6g} and white = {:.6g}; need 0 <= black < white", what,
-                response.black, response.white);
+  const std::string place = fmt::format("{}: response", what);
+  Status status = CheckPlausible(place, ".white", {response.white}, kPlausibleWhite);
+  if (status && !(response.black >= 0.0 && response.black < response.white)) {
+    status = Fail(ErrorCode::kBadData,
+                  "{} has black = {:.6g} and white = {:.6g}; need 0 <= black < white", place,
+                  response.black, response.white);
   }
-  if (!(response.white_balance.allFinite() && response.white_balance.minCoeff() > 0.0)) {
-    return Fail(ErrorCode::kBadData, "{}: response.white_balance is [{}]; need factors > 0", what,
-                fmt::join(response.white_balance, ", "));
+  const Eigen::Vector3d& balance = response.white_balance;
+  if (status && !(balance.allFinite() && balance.minCoeff() > 0.0)) {
+    status = Fail(ErrorCode::kBadData, "{}.white_balance is [{}]; need factors > 0", place,
+                  fmt::join(balance, ", "));
   }
-  const double read_noise_dn = response.read_noise_dn.value_or(0.0);
-  if (!(read_noise_dn >= 0.0 && std::isfinite(read_noise_dn))) {
-    return Fail(ErrorCode::kBadData, "{}: response.read_noise_dn is {:.6g}; need 0 or more", what,
-                read_noise_dn);
+  if (status) {
+    status = CheckPlausible(place, ".white_balance", {balance.x(), balance.y(), balance.z()},
+                            kPlausibleBalance);
   }
-  const double gain = response.gain_dn_per_electron.value_or(1.0);
-  if (!(gain > 0.0 && std::isfinite(gain))) {
-    return Fail(ErrorCode::kBadData,
-                "{}: response.gain_dn_per_electron is {:.6g}; need a number > 0", what, gain);
+  if (status) {
+    status = CheckPlausible(place, ".read_noise_dn", {response.read_noise_dn.value_or(0.0)},
+                            kPlausibleNoise);
   }
-  return {};
+  if (status) {
+    status = CheckPlausible(place, ".gain_dn_per_electron",
+                            {response.gain_dn_per_electron.value_or(1.0)}, kPlausibleGain);
+  }
+  return status;
 }
 
 std::string WhatLight(std::string_view what, size_t k) {
   return fmt::format("{}: lights[{}]", what, k);
+}
+
+// Fails where a light is another's by so much that both are never in one picture.
+Status CheckFluxRatio(const Lights& lights, std::string_view what) {
+  for (size_t k = 1; k < lights.size(); ++k) {
+    const double ratio = lights[k].flux_rgb.maxCoeff() / lights[0].flux_rgb.maxCoeff();
+    if (!(ratio <= kMostFluxRatio && ratio >= 1.0 / kMostFluxRatio)) {
+      return Fail(ErrorCode::kBadData,
+                  "{}: flux_rgb is {:.3g} times that of lights[0]; need {:.0e} to {:.0e} times",
+                  WhatLight(what, k), ratio, 1.0 / kMostFluxRatio, kMostFluxRatio);
+    }
+  }
+  return {};
 }
 
 Status CheckLights(const Lights& lights, const std::optional<Camera>& camera,
@@ -139,9 +158,9 @@ Status CheckLights(const Lights& lights, const std::optional<Camera>& camera,
     if (Status status = light.Validate(WhatLight(what, k)); !status) {
       return status;
     }
-    if (light.channel < 0) {
-      return Fail(ErrorCode::kBadData, "{}: channel is {}; need 0 or more", WhatLight(what, k),
-                  light.channel);
+    if (light.channel < 0 || light.channel > kMostChannel) {
+      return Fail(ErrorCode::kBadData, "{}: channel is {}; need 0 to {}", WhatLight(what, k),
+                  light.channel, kMostChannel);
     }
     if (!light.name.empty() && !names.insert(light.name).second) {
       return Fail(ErrorCode::kBadData, "{}: the name \"{}\" is taken; give each light its own",
@@ -161,7 +180,7 @@ Status CheckLights(const Lights& lights, const std::optional<Camera>& camera,
           what, k, Name(light.model));
     }
   }
-  return {};
+  return CheckFluxRatio(lights, what);
 }
 
 }  // namespace

@@ -16,7 +16,9 @@ constexpr double kHalfPi = std::numbers::pi / 2.0;
   return Fail(ErrorCode::kInvalidArgument, "{} = {:g}; need {}", field, value, range);
 }
 
-bool IsLength(double value) { return value > 0.0 && std::isfinite(value); }
+constexpr double kMostLengthMm = 1e7;
+
+bool IsLength(double value_mm) { return value_mm > 0.0 && value_mm <= kMostLengthMm; }
 
 class Plane final : public Surface {
  public:
@@ -163,7 +165,7 @@ Result<SurfacePtr> MakePlane(double slope_rad, double azimuth_rad, double height
 
 Result<SurfacePtr> MakeSphereCap(double radius_mm, double edge_rad) {
   if (!IsLength(radius_mm)) {
-    return OutOfRange("radius_mm", radius_mm, "radius_mm > 0");
+    return OutOfRange("radius_mm", radius_mm, "radius_mm > 0 and at most 1e7");
   }
   if (!(edge_rad > 0.0 && edge_rad < kHalfPi)) {
     return OutOfRange("edge_rad", edge_rad, "0 < edge_rad < pi/2");
@@ -173,7 +175,7 @@ Result<SurfacePtr> MakeSphereCap(double radius_mm, double edge_rad) {
 
 Result<SurfacePtr> MakeGroove(double depth_mm, double opening_rad) {
   if (!IsLength(depth_mm)) {
-    return OutOfRange("depth_mm", depth_mm, "depth_mm > 0");
+    return OutOfRange("depth_mm", depth_mm, "depth_mm > 0 and at most 1e7");
   }
   if (!(opening_rad > 0.0 && opening_rad < std::numbers::pi)) {
     return OutOfRange("opening_rad", opening_rad, "0 < opening_rad < pi");
@@ -186,10 +188,10 @@ Result<SurfacePtr> MakeSteps(int count, double tread_mm, double rise_mm, double 
     return OutOfRange("count", count, "1 to 10000");
   }
   if (!IsLength(tread_mm)) {
-    return OutOfRange("tread_mm", tread_mm, "tread_mm > 0");
+    return OutOfRange("tread_mm", tread_mm, "tread_mm > 0 and at most 1e7");
   }
   if (!IsLength(rise_mm)) {
-    return OutOfRange("rise_mm", rise_mm, "rise_mm > 0");
+    return OutOfRange("rise_mm", rise_mm, "rise_mm > 0 and at most 1e7");
   }
   if (!(riser_mm > 0.0 && riser_mm <= tread_mm)) {
     return OutOfRange("riser_mm", riser_mm, "0 < riser_mm <= tread_mm");
@@ -199,7 +201,7 @@ Result<SurfacePtr> MakeSteps(int count, double tread_mm, double rise_mm, double 
 
 Result<SurfacePtr> MakeWaves(double period_mm, double max_slope_rad) {
   if (!IsLength(period_mm)) {
-    return OutOfRange("period_mm", period_mm, "period_mm > 0");
+    return OutOfRange("period_mm", period_mm, "period_mm > 0 and at most 1e7");
   }
   if (!(max_slope_rad >= 0.0 && max_slope_rad < kHalfPi)) {
     return OutOfRange("max_slope_rad", max_slope_rad, "0 <= max_slope_rad < pi/2");

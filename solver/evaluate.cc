@@ -9,6 +9,7 @@
 #include "core/angle.h"
 #include "core/check.h"
 #include "core/statistics.h"
+#include "core/whole_number.h"
 #include "solver/least_squares/pixel_system.h"
 
 namespace sateen {
@@ -18,6 +19,7 @@ constexpr double kLowPassSdMm = 6.62;  // sqrt(ln 2) / (2 pi) * 50 mm: half of t
 constexpr double kSquaresPerSd = 8.0;  // so fine that their size widens G by 0.1 %
 constexpr double kReachSd = 4.0;       // G is cut off beyond it
 constexpr double kLeastWeight = 0.2;   // share of G on compared pixels
+constexpr double kWidestSd = 4.0;      // of G, in longest sides of the image: 2 % of G are on it
 const double kLeastNz = std::cos(80.0 * kRadPerDeg);
 
 Status CheckSize(const NormalField& field, const Image3& truth, const char* what) {
@@ -99,10 +101,15 @@ Result<ErrorStatistics> LowFrequencyErrorDeg(const NormalField& field, const Ima
   if (Status status = CheckSize(field, true_normal, "normals"); !status) {
     return tl::unexpected(status.error());
   }
-  const int side = std::max(1, static_cast<int>(kLowPassSdMm / kSquaresPerSd / pitch_mm));
+  // Beside so wide a G the whole image is a speck: no pixel is compared.
+  const ImageSize size = field.normal.Size();
+  if (!(kLowPassSdMm / pitch_mm < kWidestSd * std::max(size.width, size.height))) {
+    return ErrorStatistics{};
+  }
+  const int side = std::max(1, ClampedTo<int>(kLowPassSdMm / kSquaresPerSd / pitch_mm));
   const double sd = kLowPassSdMm / pitch_mm / side;  // in squares
   std::vector<double> g;
-  for (int i = 0; i <= static_cast<int>(std::ceil(kReachSd * sd)); ++i) {
+  for (int i = 0; i <= ClampedTo<int>(std::ceil(kReachSd * sd)); ++i) {
     g.push_back(std::exp(-0.5 * i * i / (sd * sd)));
   }
   const double g_sum = 2.0 * std::accumulate(g.begin(), g.end(), 0.0) - g[0];

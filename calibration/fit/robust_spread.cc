@@ -21,7 +21,8 @@ double Rms(const std::vector<double>& values) {
 double SpreadOf(const std::vector<double>& residuals) {
   std::vector<double> sizes(residuals.size());
   std::ranges::transform(residuals, sizes.begin(), [](double r) { return std::abs(r); });
-  return std::max(kSdPerMad * Median(std::move(sizes)), 1e-12);
+  // A fit that no sample is near leaves nothing to measure.
+  return sizes.empty() ? 1e-12 : std::max(kSdPerMad * Median(std::move(sizes)), 1e-12);
 }
 
 std::vector<size_t> OnModel(const std::vector<size_t>& indices,

@@ -164,7 +164,7 @@ double LightResiduals::NoiseRms(const Light& light, const std::vector<size_t>& i
   for (size_t i = 3; i < residuals.size(); ++i) {
     differences.push_back(std::abs(residuals[i] - residuals[i - 3]));
   }
-  return kSdPerMad * Median(std::move(differences)) / std::sqrt(2.0);
+  return differences.empty() ? 0.0 : kSdPerMad * Median(std::move(differences)) / std::sqrt(2.0);
 }
 
 Result<LightDescent> LightResiduals::Descend(LightModel model, const Light& start,

@@ -7,6 +7,7 @@
 
 #include "core/angle.h"
 #include "core/output_folder.h"
+#include "core/whole_number.h"
 #include "imaging/image_io.h"
 #include "imaging/show/pictures.h"
 
@@ -26,8 +27,8 @@ const cv::Scalar kBlue(20, 90, 200);
 const cv::Scalar kRed(200, 40, 30);
 
 cv::Point Fixed(const Eigen::Vector2d& at) {
-  return {static_cast<int>(std::lround(at.x() * (1 << kFraction))),
-          static_cast<int>(std::lround(at.y() * (1 << kFraction)))};
+  return {ClampedTo<int>(std::round(at.x() * (1 << kFraction))),
+          ClampedTo<int>(std::round(at.y() * (1 << kFraction)))};
 }
 
 void Dot(cv::Mat3b& picture, const Eigen::Vector2d& at, double radius, const cv::Scalar& color,

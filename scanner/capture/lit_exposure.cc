@@ -7,6 +7,7 @@
 #include <thread>
 
 #include "core/stopwatch.h"
+#include "core/whole_number.h"
 
 namespace sateen {
 namespace {
@@ -93,7 +94,7 @@ Status ConfirmLit(const std::optional<Light>& light, const BoardState& state, co
 
 milliseconds OnTime(const LightBoard& board, const LitExposure& exposure,
                     const CaptureOptions& options) {
-  const milliseconds shutter(static_cast<int>(std::ceil(1000.0 * exposure.exposure_s)));
+  const milliseconds shutter(ClampedTo<int>(std::ceil(1000.0 * exposure.exposure_s)));
   const milliseconds wanted = options.settle + shutter + options.margin;
   const auto channel = static_cast<std::size_t>(exposure.light->channel);
   const std::vector<LightLimits>& limits = board.Info().lights;
@@ -119,7 +120,7 @@ Result<LitFrame> ExposeUnder(LightBoard& board, TetheredCamera& camera, const Li
   }
   board.Wait(options.settle);
   KeepAlive keep_alive(board, options.keep_alive, task);
-  const milliseconds shutter(static_cast<int>(std::ceil(1000.0 * exposure.exposure_s)));
+  const milliseconds shutter(ClampedTo<int>(std::ceil(1000.0 * exposure.exposure_s)));
   const Stopwatch stopwatch;
   Result<CapturedFile> file = camera.Capture(folder, shutter + options.deadline);
   const double camera_s = stopwatch.Seconds();

@@ -2,6 +2,7 @@
 #include <utility>
 
 #include "core/json.h"
+#include "core/whole_number.h"
 #include "scanner/daemon/answer_json.h"
 
 namespace sateen {
@@ -20,7 +21,7 @@ constexpr auto kCounts = {std::pair{"bad_frames", &BoardReport::bad_frames},
                           std::pair{"faults", &BoardReport::faults}};
 
 milliseconds ReadMs(JsonReader& json, std::string_view key) {
-  return milliseconds(static_cast<std::int64_t>(json.Number(key)));
+  return milliseconds(ClampedTo<std::int64_t>(json.Number(key)));
 }
 
 BoardState ReadState(JsonReader& json) {
@@ -111,9 +112,9 @@ Result<BoardWord> BoardFromJson(const std::string& text) {
   status = status ? state.Finish() : status;
   board.report.reset_cause = json.String("reset_cause");
   board.report.uptime = ReadMs(json, "uptime_ms");
-  board.report.frames = static_cast<std::uint32_t>(json.Number("frames"));
+  board.report.frames = ClampedTo<std::uint32_t>(json.Number("frames"));
   for (const auto& [key, member] : kCounts) {
-    board.report.*member = static_cast<unsigned>(json.Number(key));
+    board.report.*member = ClampedTo<unsigned>(json.Number(key));
   }
   board.info.reset_cause = board.report.reset_cause;
   board.info.fault = board.report.state.fault;

@@ -31,11 +31,13 @@ Enum ReadName(JsonReader& json, std::string_view key, const std::array<Enum, N>&
   return match == values.end() ? values[0] : *match;
 }
 
-std::optional<double> ReadFactor(JsonReader& json, std::string_view key, double most) {
+std::optional<double> ReadFactor(JsonReader& json, std::string_view key, double least,
+                                 double most) {
   const std::optional<double> factor = json.OptionalNumber(key);
   const double value = factor.value_or(1.0);
   json.Require(value > 0.0 && value <= most, key,
                fmt::format("is {}; need more than 0 and at most {}", value, most));
+  json.Require(value >= least, key, fmt::format("is {}; need at least {}", value, least));
   return factor;
 }
 
@@ -98,9 +100,9 @@ SessionFrame ReadSessionFrame(JsonReader& json) {
   ReadRoleAndLight(json, frame);
   frame.file = ReadFileName(json, "file");
   frame.sha256 = ReadHash(json, "sha256");
-  frame.exposure_s = ReadFactor(json, "exposure_s", 3600.0);
-  frame.f_number = ReadFactor(json, "f_number", 1000.0);
-  frame.iso = ReadFactor(json, "iso", 1e7);
+  frame.exposure_s = ReadFactor(json, "exposure_s", 1e-9, 3600.0);
+  frame.f_number = ReadFactor(json, "f_number", 0.1, 1000.0);
+  frame.iso = ReadFactor(json, "iso", 1e-2, 1e7);
   if (const auto shift = json.OptionalNumbers("shift_px", 2)) {
     frame.shift_px = Eigen::Vector2d((*shift)[0], (*shift)[1]);
     json.Require(frame.shift_px->cwiseAbs().maxCoeff() <= kMostShiftPx, "shift_px",

@@ -4,12 +4,15 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <chrono>
+#include <cmath>
+#include <cstdint>
 #include <limits>
 #include <thread>
 
 #include "core/angle.h"
 #include "core/option_range.h"
 #include "core/stopwatch.h"
+#include "core/whole_number.h"
 
 namespace sateen::small_helpers_test {
 namespace {
@@ -29,6 +32,25 @@ TEST(AngleBetweenRad, IsExactForSmallAngles) {
     EXPECT_NEAR(AngleBetweenRad(a, b) / angle, 1.0, 1e-12) << angle;
   }
   EXPECT_NEAR(AngleBetweenRad(Eigen::Vector3f(0, 0, 1), Eigen::Vector3f(1e-6F, 0, 1)), 1e-6, 1e-13);
+}
+
+TEST(ClampedTo, DropsTheFractionAndStaysInTheType) {
+  using IntLimits = std::numeric_limits<int>;
+  EXPECT_EQ(ClampedTo<int>(2.9), 2);
+  EXPECT_EQ(ClampedTo<int>(-2.9), -2);
+  EXPECT_EQ(ClampedTo<int>(2147483646.5), 2147483646);
+  for (const double huge : {2147483647.0, 2147483648.0, 1e30, 1e308, HUGE_VAL}) {
+    EXPECT_EQ(ClampedTo<int>(huge), IntLimits::max());
+    EXPECT_EQ(ClampedTo<int>(-huge - 1.0), IntLimits::min());
+  }
+  EXPECT_EQ(ClampedTo<int>(std::nan("")), 0);
+  EXPECT_EQ(ClampedTo<unsigned>(-1.0), 0U);
+  EXPECT_EQ(ClampedTo<std::uint16_t>(70'000.0), 65535);
+  EXPECT_EQ(ClampedTo<std::int64_t>(9223372036854775808.0),
+            std::numeric_limits<std::int64_t>::max());
+  EXPECT_EQ(ClampedTo<std::uint64_t>(18446744073709551616.0),
+            std::numeric_limits<std::uint64_t>::max());
+  EXPECT_EQ(ClampedTo<std::int64_t>(-9.3e18), std::numeric_limits<std::int64_t>::min());
 }
 
 TEST(Stopwatch, CountsSecondsUpwards) {

@@ -110,6 +110,22 @@ TEST(GainField, BeyondTheBorderIsAsAtTheBorder) {
   EXPECT_NE(field.WeightsAt({-500.0, 45.0}).along_y[0], 0.0);
 }
 
+// A fit that diverged asks at such places: there is a gain, and no crash.
+TEST(GainField, AnyPlaceHasAGain) {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const double infinity = std::numeric_limits<double>::infinity();
+  GainField field{.origin_mm = {0.0, 0.0}, .spacing_mm = 10.0, .columns = 5, .rows = 4};
+  field.gain.assign(20, 2.0);
+  for (const double x : {0.0, nan, infinity, -infinity, 1e300, -1e300}) {
+    for (const double y : {0.0, nan, infinity, -infinity, 1e300, -1e300}) {
+      const double gain = field.At({x, y});
+      EXPECT_TRUE(std::isnan(x) || std::isnan(y) ? std::isnan(gain) : std::abs(gain - 2.0) < 1e-12)
+          << x << " " << y << " " << gain;
+      EXPECT_LE(field.WeightsAt({x, y}).first, 1U);
+    }
+  }
+}
+
 TEST(ShadowOnTable, IsOnTheRayFromTheLight) {
   const Eigen::Vector3d light(100, -50, 400);
   EXPECT_EQ(ShadowOnTable(light, {30, 20, 0}), Eigen::Vector2d(30, 20));  // exact on the plane

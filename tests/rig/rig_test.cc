@@ -131,14 +131,15 @@ TEST(RigToJson, RoundTripsToTheLastBit) {
     file["lights"].push_back(light);
   }
   file["lights"][2]["axis"] = {0, -0.6001, -0.8};
-  file["lights"][1]["flux_rgb"] = {third, std::numbers::pi, 1e-300};
+  file["lights"][1]["flux_rgb"] = {third, std::numbers::pi, 1.2345678901234567e-9};
   file["camera"]["table_from_camera"][5] = -0.8000001;  // made orthonormal on reading
 
   const std::string once = RigToJson(Read(file.dump()).value());
   const Rig rig = Read(once).value();
 
   EXPECT_EQ(RigToJson(rig), once);
-  EXPECT_EQ(rig.lights[1].flux_rgb, Eigen::Vector3d(third, std::numbers::pi, 1e-300));
+  EXPECT_EQ(rig.lights[1].flux_rgb,
+            Eigen::Vector3d(third, std::numbers::pi, 1.2345678901234567e-9));
   EXPECT_NEAR(rig.lights[0].direction.norm(), 1.0, 1e-15);
   EXPECT_NEAR(rig.lights[2].axis.norm(), 1.0, 1e-15);
   const Eigen::Matrix3d r = rig.camera->table_from_camera.linear();
@@ -170,6 +171,21 @@ TEST(ReadRig, LightsMustBeAboveTheTable) {
               HasSubstr("lights[0].direction has z = -0.8; need z > 0"));
   EXPECT_THAT(MessageWith("/lights/1/position_mm", {0, 0, -5}),
               HasSubstr("lights[1]: position_mm"));
+}
+
+TEST(ReadRig, NumbersThatNoRigHasAreNamed) {
+  EXPECT_THAT(MessageWith("/camera/k", {1e15, 1e15, 320, 240}),
+              HasSubstr("camera.k: fx or fy is 1e+15; need 0.1 to 1e+08 px"));
+  EXPECT_THAT(MessageWith("/camera/distortion", {0, 0, 1.5, 0, 0}),
+              HasSubstr("camera.distortion: p1 or p2 is 1.5; need -1 to 1"));
+  EXPECT_THAT(MessageWith("/lights/1/position_mm", {0, 1e8, 5}),
+              HasSubstr("lights[1]: position_mm: x or y is 1e+08; need -1e+07 to 1e+07 mm"));
+  EXPECT_THAT(MessageWith("/lights/1/flux_rgb", {1e30, 1e30, 1e30}),
+              HasSubstr("lights[1]: flux_rgb is"));
+  EXPECT_THAT(MessageWith("/lights/1/flux_rgb", {1e-40, 1, 1}), HasSubstr("flux_rgb"));
+  EXPECT_THAT(MessageWith("/response/gain_dn_per_electron", 1e30),
+              HasSubstr("response.gain_dn_per_electron is 1e+30; need 1e-09 to 1e+09"));
+  EXPECT_THAT(MessageWith("/lights/0/channel", 65536), HasSubstr("channel is 65536; need 0 to"));
 }
 
 TEST(ReadRig, OnlyTheKeysOfTheModelAreAllowed) {

@@ -155,6 +155,15 @@ TEST(LowFrequencyError, GrowsWithASlopeThatGrowsTowardsTheEdge) {
   EXPECT_NEAR(worst, 1e-5 * (100.0 - 0.8 * 6.62) * 180.0 / std::numbers::pi, 2e-3 * 0.0573);
 }
 
+// A focal length of 1e15 px asks for this: the image is a speck beside the Gaussian.
+TEST(LowFrequencyError, ComparesNothingOnASpeck) {
+  for (const double pitch_mm : {1e-13, 1e-300}) {
+    const auto compared = LowFrequencyErrorDeg(TiltedRow({0.0}), UpwardTruth(1), pitch_mm);
+    ASSERT_TRUE(compared);
+    EXPECT_EQ(compared->count, 0);
+  }
+}
+
 TEST(LowFrequencyError, RefusesTruthOfAnotherSize) {
   EXPECT_EQ(LowFrequencyErrorDeg(TiltedRow({0.0}), UpwardTruth(2), 1.0).error().code,
             ErrorCode::kBadData);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/whole_number.h"
 #include "rig/projection.h"
 
 namespace sateen {
@@ -29,10 +30,12 @@ PatchPlaces PlacesOf(const ChartPatch& patch, double patch_mm, const Camera& cam
   }
   const Image<float>& samples = mosaic.samples;
   const Eigen::Isometry2d chart_from_table = table_from_chart.inverse();
-  const int right = std::min(samples.width - 1, static_cast<int>(std::ceil(high.x())) + 1);
-  const int bottom = std::min(samples.height - 1, static_cast<int>(std::ceil(high.y())) + 1);
-  for (int y = std::max(0, static_cast<int>(low.y()) - 1); y <= bottom; ++y) {
-    for (int x = std::max(0, static_cast<int>(low.x()) - 1); x <= right; ++x) {
+  const int left = ClampedTo<int>(std::max(0.0, low.x() - 1.0));
+  const int top = ClampedTo<int>(std::max(0.0, low.y() - 1.0));
+  const int right = ClampedTo<int>(std::min(samples.width - 1.0, std::ceil(high.x()) + 1.0));
+  const int bottom = ClampedTo<int>(std::min(samples.height - 1.0, std::ceil(high.y()) + 1.0));
+  for (int y = top; y <= bottom; ++y) {
+    for (int x = left; x <= right; ++x) {
       const auto on_table = TablePointOfPixel(camera, x, y);
       if (!on_table) {
         continue;
