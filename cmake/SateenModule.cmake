@@ -10,14 +10,16 @@ foreach(line IN LISTS slowest)
 endforeach()
 
 # sateen_add_module(<name> SOURCES ... [PUBLIC ...] [PRIVATE ...] [TESTS ...] [TEST_LIBS ...]
-#                   [RELEASE_TESTS])
+#                   [RELEASE_TESTS] [HOT] [HOT_TESTS])
 #
 # Declares the library sateen_<name> and its alias sateen::<name>. TESTS are files of the folder in
 # tests/ that mirrors the module's own; together they are one program, sateen_<name>_test, and each
 # is one test of CTest, "<folder>/<file>". RELEASE_TESTS: they depend on -O3, SIMD or exact bits, or
 # run the programs, so that CI runs them in release too and not under the sanitizers alone.
+# HOT: tests spend more time in the module than its compiling takes, so that it is optimised under
+# the sanitizers too. HOT_TESTS: the same of the tests' own files.
 function(sateen_add_module name)
-  cmake_parse_arguments(PARSE_ARGV 1 arg "RELEASE_TESTS" "" "SOURCES;PUBLIC;PRIVATE;TESTS;TEST_LIBS")
+  cmake_parse_arguments(PARSE_ARGV 1 arg "RELEASE_TESTS;HOT;HOT_TESTS" "" "SOURCES;PUBLIC;PRIVATE;TESTS;TEST_LIBS")
   if(arg_UNPARSED_ARGUMENTS)
     message(FATAL_ERROR "sateen_add_module(${name}): unknown arguments ${arg_UNPARSED_ARGUMENTS}")
   endif()
@@ -29,6 +31,9 @@ function(sateen_add_module name)
     $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}> $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}/sateen>)
   target_link_libraries(sateen_${name} PUBLIC ${arg_PUBLIC} PRIVATE ${arg_PRIVATE})
   sateen_set_warnings(sateen_${name})
+  if(arg_HOT)
+    target_compile_options(sateen_${name} PRIVATE $<$<CONFIG:RelWithDebInfo>:-O2>)
+  endif()
   if(SATEEN_BUILD_TESTS AND arg_TESTS)
     file(RELATIVE_PATH folder ${PROJECT_SOURCE_DIR} ${CMAKE_CURRENT_SOURCE_DIR})
     list(TRANSFORM arg_TESTS PREPEND ${PROJECT_SOURCE_DIR}/tests/${folder}/ OUTPUT_VARIABLE sources)
@@ -36,6 +41,7 @@ function(sateen_add_module name)
     target_link_libraries(sateen_${name}_test PRIVATE
       sateen::${name} ${arg_PRIVATE} ${arg_TEST_LIBS} sateen::testing GTest::gmock_main)
     sateen_set_warnings(sateen_${name}_test)
+    set_target_properties(sateen_${name}_test PROPERTIES HOT_TESTS ${arg_HOT_TESTS})
     sateen_register_tests(sateen_${name}_test ${folder} ${sources})
     add_dependencies(sateen_tests sateen_${name}_test)
     if(arg_RELEASE_TESTS)
