@@ -7,6 +7,7 @@
 # BOOT_BAUD  of its bootloader: 57600 for a Nano with the old one
 # LIGHTS  of the firmware that flash uploads: 14, or 16 without flash sync and shutter
 # SECONDS  how long fuzz runs each target
+# ROUNDS   of inputs, for each of the nine readers
 # LABEL   which tests "make test" builds and runs: all, or "release", those that depend on
 #         optimisation, SIMD or exact bits, or run the programs
 # KILLS   for kills: system calls of each program at which it is killed; 0: all
@@ -20,6 +21,7 @@ LIGHTS ?= 14
 IMAGE_14 = sateen-controller.hex
 IMAGE_16 = sateen-controller-16.hex
 SECONDS ?= 60
+ROUNDS ?= 7000
 LABEL ?=
 KILLS ?= 60
 SEEDS ?= few
@@ -30,7 +32,7 @@ CTEST = ctest --output-on-failure --no-tests=error -j$(JOBS)
 OUR_SOURCES = git ls-files -z --cached --others --exclude-standard '*.h' '*.cc' '*.c'
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo programs build test bench accuracy firmware flash fuzz mutants kills format format-check tidy asan tsan diagrams nightly clean
+.PHONY: help setup demo programs build test bench accuracy firmware flash fuzz inputs hostile mutants kills format format-check tidy asan tsan diagrams nightly clean
 
 help:  ## This list
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 16
@@ -79,6 +81,17 @@ fuzz: setup  ## libFuzzer with the address sanitizer over each target of fuzz/
 	    mkdir -p build/fuzz/found/$$name; echo "== $$name"; \
 	    $$target -max_total_time=$(SECONDS) -print_final_stats=1 \
 	        build/fuzz/found/$$name fuzz/corpus/$$name || exit 1; done
+
+inputs: setup  ## Feed every reader ROUNDS mutated inputs, each within 10 s and 2 GB
+	@cmake --preset $(PRESET) --log-level=WARNING
+	@cmake --build --preset $(PRESET) -j$(JOBS) --target sateen_fuzz_inputs
+	@for program in build/release/bin/sateen_fuzz_*_corpus; do \
+	    name=$${program##*sateen_fuzz_}; name=$${name%_corpus}; printf '%s: ' $$name; \
+	    $$program fuzz/corpus/$$name $(ROUNDS) || exit 1; done
+
+hostile: programs  ## Special files and unfolding files in place of every input of the program
+	@tests/hostile/special_files.py build/release/bin/sateen --all
+	@tests/hostile/bombs.py build/release/bin/sateen
 
 mutants: setup  ## Break the code in each way of tests/mutants; see a test fail. WORD=..., a list or part of a name
 	@tools/mutants -j$(JOBS) $(WORD)

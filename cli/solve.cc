@@ -93,6 +93,10 @@ void AddMaps(CLI::App& cmd, SolveOptions& options) {
   AddChoice(cmd, "--encoding",
             "Encoding of integer image files; auto: 8 bits are sRGB, 16 bits are linear",
             {Encoding::kAuto, Encoding::kLinear, Encoding::kSrgb}, options.encoding);
+  cmd.add_option("--max-megapixels", options.max_megapixels,
+                 "Read frames of up to this many megapixels, however small their files; without "
+                 "it, files that unfold into far more than a photograph are refused")
+      ->check(CLI::Range(1, 2000));
   cmd.add_option("--height", options.height_mm,
                  "Mean height of the surface above the table in millimetres, for thick cloth under "
                  "near lights")

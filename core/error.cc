@@ -16,6 +16,8 @@ int ExitStatus(const Error& error) {
       return 5;
     case ErrorCode::kCancelled:
       return 6;
+    case ErrorCode::kOutOfMemory:
+      return 1;
   }
   return 1;
 }

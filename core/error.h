@@ -17,7 +17,8 @@ enum class ErrorCode {
   kIo,               // a file cannot be read or written
   kDevice,           // a device refuses or is absent
   kTimeout,          // a device does not answer in time
-  kCancelled         // a person or a signal asked to stop
+  kCancelled,        // a person or a signal asked to stop
+  kOutOfMemory       // the data are fine, and this machine has no room for them
 };
 
 // `message` says what was found, what was needed and what to do.
@@ -35,7 +36,8 @@ tl::unexpected<Error> Fail(ErrorCode code, fmt::format_string<Args...> text, Arg
   return tl::unexpected<Error>({code, fmt::format(text, std::forward<Args>(args)...)});
 }
 
-// Returns 2 usage, 3 bad or degenerate data, 4 I/O, 5 device, 6 cancelled. (0 is done, 1 internal.)
+// Returns 1 out of memory, 2 usage, 3 bad or degenerate data, 4 I/O, 5 device, 6 cancelled. (0 is
+// done, 1 internal too.)
 [[nodiscard]] int ExitStatus(const Error& error);
 
 }  // namespace sateen

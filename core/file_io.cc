@@ -3,8 +3,11 @@
 #include <fcntl.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <utility>
+
+#include "core/input_file.h"
 
 namespace sateen {
 namespace {
@@ -86,29 +89,42 @@ Status FlushToDisk(const std::filesystem::path& path, const std::filesystem::pat
 
 Status ReadPieces(const std::filesystem::path& path,
                   const std::function<void(std::string_view)>& use) {
-  const FileDescriptor file(path, O_RDONLY);
-  if (file.Get() < 0) {
-    return Fail(ErrorCode::kIo, "{}: cannot read: {}", path.string(), SystemReason(errno));
+  const Result<InputFile> file = InputFile::Open(path);
+  if (!file) {
+    return tl::unexpected(file.error());
   }
   std::string piece(kPieceBytes, '\0');
-  while (true) {
-    const ssize_t count = read(file.Get(), piece.data(), piece.size());
-    if (count == 0) {
+  for (uint64_t offset = 0;;) {
+    const Result<size_t> count = file->ReadAt(offset, piece);
+    if (!count) {
+      return tl::unexpected(count.error());
+    }
+    use(std::string_view(piece).substr(0, *count));
+    if (*count < piece.size()) {
       return {};
     }
-    if (count > 0) {
-      use(std::string_view(piece).substr(0, static_cast<size_t>(count)));
-    } else if (errno != EINTR) {
-      return Fail(ErrorCode::kIo, "{}: cannot read: {}", path.string(), SystemReason(errno));
-    }
+    offset += *count;
   }
 }
 
-Result<std::string> ReadFileBytes(const std::filesystem::path& path) {
-  std::string bytes;
-  if (Status read = ReadPieces(path, [&](std::string_view piece) { bytes += piece; }); !read) {
-    return tl::unexpected(read.error());
+Result<std::string> ReadFileBytes(const std::filesystem::path& path, uint64_t max_bytes) {
+  const Result<InputFile> file = InputFile::Open(path);
+  if (!file) {
+    return tl::unexpected(file.error());
   }
+  // Files under /proc say 0 and hold more.
+  std::string bytes(std::min(std::max(file->Bytes(), uint64_t{kPieceBytes}), max_bytes) + 1, '\0');
+  const Result<size_t> count = file->ReadAt(0, bytes);
+  if (!count) {
+    return tl::unexpected(count.error());
+  }
+  if (*count > max_bytes || file->Bytes() > max_bytes) {
+    return Fail(ErrorCode::kBadData,
+                "{}: is too long: it has {} bytes, and at most {} are read of a file of this kind; "
+                "is it the right file?",
+                path.string(), std::max(file->Bytes(), uint64_t{*count}), max_bytes);
+  }
+  bytes.resize(*count);
   return bytes;
 }
 

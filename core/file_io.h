@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <string>
@@ -9,12 +10,16 @@
 
 namespace sateen {
 
-// Hands the file's bytes to `use`, piece by piece. kIo where it is absent, a folder or unreadable.
+// Records and tables of text: a hostile one of this length still parses in 300 MB.
+inline constexpr uint64_t kMaxTextBytes = uint64_t{8} << 20;
+
+// Hands the file's bytes to `use`, piece by piece. Errors as InputFile::Open().
 [[nodiscard]] Status ReadPieces(const std::filesystem::path& path,
                                 const std::function<void(std::string_view)>& use);
 
-// Reads the file's bytes. Fails with kIo if it is absent, a folder or unreadable.
-[[nodiscard]] Result<std::string> ReadFileBytes(const std::filesystem::path& path);
+// Reads the file's bytes. Errors as InputFile::Open(); kBadData if there are more than `max_bytes`.
+[[nodiscard]] Result<std::string> ReadFileBytes(const std::filesystem::path& path,
+                                                uint64_t max_bytes = kMaxTextBytes);
 
 // Creates or empties `path` and writes `bytes`. Errors speak of `shown`, the name that the user
 // knows. To replace a file that counts, use core/output_folder.h.

@@ -2,14 +2,10 @@
 
 #include <algorithm>
 #include <array>
-#include <cerrno>
-#include <fstream>
 #include <iterator>
 #include <map>
 #include <optional>
 #include <set>
-#include <system_error>
-#include <utility>
 #include <vector>
 
 namespace sateen {
@@ -17,19 +13,19 @@ namespace {
 
 constexpr size_t kHeadBytes = 16;
 
-tl::unexpected<Error> CutShort(const std::filesystem::path& path, uint64_t file_bytes,
-                               uint64_t needed_bytes) {
-  return Fail(ErrorCode::kBadData,
-              "{}: is cut short: it has {} bytes and needs at least {}; copy it again",
-              path.string(), file_bytes, needed_bytes);
+Status CheckReaches(const InputFile& file, uint64_t needed_bytes) {
+  return needed_bytes <= file.Bytes()
+             ? Status()
+             : Fail(ErrorCode::kBadData,
+                    "{}: is cut short: it has {} bytes and needs at least {}; copy it again",
+                    file.Path().string(), file.Bytes(), needed_bytes);
 }
 
 // Reads numbers at places of a file, either byte order; remembers how far the file would have to
 // reach for all that was asked of it.
 class FileProbe {
  public:
-  FileProbe(const std::filesystem::path& path, uint64_t file_bytes)
-      : stream_(path, std::ios::binary), file_bytes_(file_bytes) {}
+  explicit FileProbe(const InputFile& file) : file_(file) {}
 
   void SetBigEndian(bool big_endian) { big_endian_ = big_endian; }
   void Need(uint64_t offset, uint64_t count) {
@@ -38,22 +34,34 @@ class FileProbe {
   // Reads an unsigned integer of `width` bytes; nothing if the file ends before it.
   std::optional<uint32_t> Read(uint64_t offset, size_t width) {
     Need(offset, width);
-    unsigned char bytes[4] = {};
-    if (offset + width > file_bytes_ || !stream_.seekg(static_cast<std::streamoff>(offset)) ||
-        !stream_.read(reinterpret_cast<char*>(bytes), static_cast<std::streamsize>(width))) {
+    if (!Load(offset, width)) {
       return std::nullopt;
     }
+    const char* const bytes = page_.data() + (offset - page_start_);
     uint32_t value = 0;
     for (size_t i = 0; i < width; ++i) {
-      value = value << 8 | bytes[big_endian_ ? i : width - 1 - i];
+      value = value << 8 | static_cast<unsigned char>(bytes[big_endian_ ? i : width - 1 - i]);
     }
     return value;
   }
   [[nodiscard]] uint64_t NeededBytes() const { return needed_bytes_; }
 
  private:
-  std::ifstream stream_;
-  uint64_t file_bytes_;
+  // Makes page_ hold the bytes; false where the file ends before them.
+  bool Load(uint64_t offset, size_t width) {
+    if (offset >= page_start_ && offset + width <= page_start_ + page_.size()) {
+      return true;
+    }
+    page_.resize(kPageBytes);
+    page_start_ = offset;
+    page_.resize(file_.ReadAt(offset, page_).value_or(0));
+    return page_.size() >= width;
+  }
+
+  static constexpr size_t kPageBytes = 4096;
+  const InputFile& file_;
+  std::string page_;  // part of the file, from page_start_
+  uint64_t page_start_ = 0;
   uint64_t needed_bytes_ = 0;
   bool big_endian_ = true;
 };
@@ -84,7 +92,7 @@ class TiffWalk {
 
   void Run() {
     pending_.push_back(probe_.Read(4, 4).value_or(0));
-    while (!pending_.empty()) {
+    while (!pending_.empty() && !Overflows()) {
       const uint32_t offset = pending_.back();
       pending_.pop_back();
       if (offset != 0 && visited_.size() < kMaxDirectories && visited_.insert(offset).second) {
@@ -95,15 +103,22 @@ class TiffWalk {
   // Tiles that the directories do not list.
   [[nodiscard]] uint64_t MissingTiles() const { return missing_tiles_; }
 
+  // Whether there was more than is walked.
+  [[nodiscard]] bool Overflows() const { return entries_ > kMaxEntries || values_ > kMaxValues; }
+
+  // Over all directories. Cameras write some hundred entries, and a value per strip or tile.
+  static constexpr uint64_t kMaxEntries = 1U << 14;
+  static constexpr uint64_t kMaxValues = 1U << 20;
+
  private:
   static constexpr size_t kMaxDirectories = 64;
-  static constexpr uint64_t kMaxValues = 1U << 20;
   using Fields = std::map<uint32_t, std::vector<uint32_t>>;
 
   void VisitDirectory(uint64_t offset) {
     const uint32_t entries = probe_.Read(offset, 2).value_or(0);
     Fields fields;
-    for (uint32_t i = 0; i < entries; ++i) {
+    entries_ += entries;
+    for (uint32_t i = 0; i < entries && !Overflows(); ++i) {
       const uint64_t entry = offset + 2 + uint64_t{12} * i;
       const uint32_t tag = probe_.Read(entry, 2).value_or(0);
       fields[tag] = Values(entry, std::ranges::find(kWalked, tag) != kWalked.end());
@@ -149,7 +164,8 @@ class TiffWalk {
     }
     std::vector<uint32_t> values;
     const bool is_number = type == 3 || type == 4 || type == 13;
-    for (uint64_t i = 0; wanted && is_number && i < std::min(count, kMaxValues); ++i) {
+    for (uint64_t i = 0; wanted && is_number && i < count && !Overflows(); ++i) {
+      ++values_;
       const std::optional<uint32_t> value = probe_.Read(place + width * i, width);
       if (!value) {
         break;
@@ -162,36 +178,23 @@ class TiffWalk {
   FileProbe& probe_;
   std::vector<uint32_t> pending_;
   std::set<uint32_t> visited_;
+  uint64_t entries_ = 0;
+  uint64_t values_ = 0;
   uint64_t missing_tiles_ = 0;
 };
 
 }  // namespace
 
-Result<FileHead> ReadFileHead(const std::filesystem::path& path) {
-  std::error_code error;
-  const std::filesystem::file_status status = std::filesystem::status(path, error);
-  if (!std::filesystem::exists(status)) {
-    return Fail(ErrorCode::kIo, "{}: no such file", path.string());
+Result<std::string> ReadHead(const InputFile& file) {
+  std::string head(kHeadBytes, '\0');
+  const Result<size_t> count = file.ReadAt(0, head);
+  if (!count) {
+    return tl::unexpected(count.error());
   }
-  if (std::filesystem::is_directory(status)) {
-    return Fail(ErrorCode::kIo, "{}: is a folder, not a file", path.string());
+  if (*count == 0) {
+    return Fail(ErrorCode::kBadData, "{}: is empty; copy it again", file.Path().string());
   }
-  std::ifstream stream(path, std::ios::binary);
-  FileHead head;
-  head.bytes.resize(kHeadBytes);
-  if (!stream) {
-    return Fail(ErrorCode::kIo, "{}: cannot be opened: {}", path.string(),
-                std::generic_category().message(errno));
-  }
-  stream.read(head.bytes.data(), static_cast<std::streamsize>(kHeadBytes));
-  head.bytes.resize(static_cast<size_t>(stream.gcount()));
-  head.file_bytes = std::filesystem::file_size(path, error);
-  if (error || stream.bad()) {
-    return Fail(ErrorCode::kIo, "{}: cannot be read", path.string());
-  }
-  if (head.bytes.empty()) {
-    return Fail(ErrorCode::kBadData, "{}: is empty; copy it again", path.string());
-  }
+  head.resize(*count);
   return head;
 }
 
@@ -199,45 +202,45 @@ bool IsTiffHead(const std::string& bytes) {
   return bytes.starts_with(std::string("II*\0", 4)) || bytes.starts_with(std::string("MM\0*", 4));
 }
 
-Status CheckPngIsWhole(const std::filesystem::path& path) {
-  const Result<FileHead> head = ReadFileHead(path);
-  if (!head) {
-    return tl::unexpected(head.error());
-  }
+Status CheckPngIsWhole(const InputFile& file) {
   constexpr uint32_t kEndMark = 0x49454E44;  // "IEND"
-  FileProbe probe(path, head->file_bytes);
+  constexpr int kMaxChunks = 1 << 20;
+  FileProbe probe(file);
   uint64_t chunk = 8;
   std::optional<uint32_t> type;
+  int chunks = 0;
   do {
     const std::optional<uint32_t> length = probe.Read(chunk, 4);
     type = probe.Read(chunk + 4, 4);
     chunk += 12 + uint64_t{length.value_or(0)};  // length, type and checksum
     probe.Need(chunk, 0);
-  } while (type && *type != kEndMark);
-  if (probe.NeededBytes() > head->file_bytes) {
-    return CutShort(path, head->file_bytes, probe.NeededBytes());
+  } while (type && *type != kEndMark && ++chunks < kMaxChunks);
+  if (chunks == kMaxChunks) {
+    return Fail(ErrorCode::kBadData, "{}: has more than {} chunks; save it again",
+                file.Path().string(), kMaxChunks);
   }
-  return {};
+  return CheckReaches(file, probe.NeededBytes());
 }
 
-Status CheckTiffIsWhole(const std::filesystem::path& path) {
-  const Result<FileHead> head = ReadFileHead(path);
-  if (!head) {
-    return tl::unexpected(head.error());
-  }
-  FileProbe probe(path, head->file_bytes);
-  probe.SetBigEndian(head->bytes.starts_with("MM"));
-  TiffWalk walk(probe);
-  walk.Run();
-  if (walk.MissingTiles() > 0) {
-    return Fail(ErrorCode::kBadData,
-                "{}: is damaged: {} tiles of its picture are not in its directory; copy it again",
-                path.string(), walk.MissingTiles());
-  }
-  if (probe.NeededBytes() > head->file_bytes) {
-    return CutShort(path, head->file_bytes, probe.NeededBytes());
-  }
-  return {};
+Status CheckTiffIsWhole(const InputFile& file) {
+  return ReadHead(file).and_then([&](const std::string& head) -> Status {
+    FileProbe probe(file);
+    probe.SetBigEndian(head.starts_with("MM"));
+    TiffWalk walk(probe);
+    walk.Run();
+    if (walk.Overflows()) {
+      return Fail(ErrorCode::kBadData,
+                  "{}: its directories hold more than {} entries or {} values; it is damaged: copy "
+                  "it again",
+                  file.Path().string(), TiffWalk::kMaxEntries, TiffWalk::kMaxValues);
+    }
+    if (walk.MissingTiles() > 0) {
+      return Fail(ErrorCode::kBadData,
+                  "{}: is damaged: {} tiles of its picture are not in its directory; copy it again",
+                  file.Path().string(), walk.MissingTiles());
+    }
+    return CheckReaches(file, probe.NeededBytes());
+  });
 }
 
 }  // namespace sateen

@@ -6,18 +6,19 @@
 #include <array>
 #include <cctype>
 #include <exception>
+#include <memory>
+#include <new>
 #include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
 
+#include "core/input_file.h"
 #include "imaging/color.h"
 #include "imaging/file_check.h"
 
 namespace sateen {
 namespace {
-
-constexpr int64_t kMaxPixels = int64_t{1} << 31;
 
 // A decoded file: fractions of full scale for integers, after the transfer function if asked.
 struct Decoded {
@@ -64,18 +65,10 @@ tl::unexpected<Error> Undecodable(const std::filesystem::path& path, std::string
 }
 
 Status CheckSpec(const std::filesystem::path& path, std::string_view format,
-                 const OIIO::ImageSpec& spec, uint64_t file_bytes) {
-  const int64_t pixels = int64_t{spec.width} * spec.height;
-  if (spec.width <= 0 || spec.height <= 0 || pixels > kMaxPixels || spec.depth != 1) {
-    return Fail(ErrorCode::kBadData,
-                "{}: its header says {} x {} x {} pixels; needed is a flat picture of 1 to 2^31",
-                path.string(), spec.width, spec.height, spec.depth);
-  }
-  if (static_cast<uint64_t>(spec.image_bytes(true)) / kMaxCompression > file_bytes) {
-    return Fail(ErrorCode::kBadData,
-                "{}: its header says {} x {} pixels, which {} bytes cannot hold; the file is "
-                "damaged or cut short",
-                path.string(), spec.width, spec.height, file_bytes);
+                 const OIIO::ImageSpec& spec) {
+  if (spec.depth != 1) {
+    return Fail(ErrorCode::kBadData, "{}: has {} slices; need a flat picture", path.string(),
+                spec.depth);
   }
   if (spec.deep || spec.nchannels < 1 || spec.nchannels > 4) {
     return Fail(ErrorCode::kBadData, "{}: has {} {}channels; needed are 1 to 4 flat ones",
@@ -187,41 +180,75 @@ Result<Decoded> DecodeOpened(const std::filesystem::path& path, OIIO::ImageInput
   return decoded;
 }
 
-Result<Decoded> DecodeUnguarded(const std::filesystem::path& path, Encoding encoding) {
-  const Result<FileHead> head = ReadFileHead(path);
+// A file whose header is read and allowed.
+struct Opened {
+  InputFile file;  // as long as `input` reads it
+  std::unique_ptr<OIIO::ImageInput> input;
+};
+
+Result<Opened> OpenUnguarded(const std::filesystem::path& path, const PictureLimit& limit) {
+  Result<InputFile> file = InputFile::Open(path);
+  if (!file) {
+    return tl::unexpected(file.error());
+  }
+  const Result<std::string> head = ReadHead(*file);
   if (!head) {
     return tl::unexpected(head.error());
   }
-  const char* format = FormatOf(path, head->bytes);
+  const char* format = FormatOf(path, *head);
   if (format == nullptr) {
     return Fail(ErrorCode::kBadData, "{}: is not an EXR, PNG, TIFF, TGA or JPEG file",
                 path.string());
   }
   if (std::string_view(format) == "png") {
-    if (const Status whole = CheckPngIsWhole(path); !whole) {
+    if (const Status whole = CheckPngIsWhole(*file); !whole) {
       return tl::unexpected(whole.error());
     }
   }
-  const auto input = OIIO::ImageInput::create(format);
-  if (!input) {
+  Opened opened{*std::move(file), OIIO::ImageInput::create(format)};
+  if (!opened.input) {
     return Fail(ErrorCode::kBadData, "{}: this OpenImageIO cannot read {} files: {}", path.string(),
                 format, OIIO::geterror());
   }
   OIIO::ImageSpec as_stored;
   as_stored.attribute("oiio:UnassociatedAlpha", 1);
-  OIIO::ImageSpec opened;
-  if (!input->open(path.string(), opened, as_stored)) {
-    return Undecodable(path, input->geterror());
+  OIIO::ImageSpec ignored;
+  if (!opened.input->open(opened.file.LibraryName(), ignored, as_stored)) {
+    return Undecodable(path, opened.input->geterror());
   }
-  if (const Status usable = CheckSpec(path, format, input->spec(), head->file_bytes); !usable) {
-    return tl::unexpected(usable.error());
+  const OIIO::ImageSpec& spec = opened.input->spec();
+  if (const Status allowed =
+          limit.Check(path, {spec.width, spec.height}, opened.file.Bytes()).and_then([&] {
+            return CheckSpec(path, format, spec);
+          });
+      !allowed) {
+    return tl::unexpected(allowed.error());
   }
-  return DecodeOpened(path, *input, encoding);
+  return opened;
 }
 
-Result<Decoded> Decode(const std::filesystem::path& path, Encoding encoding) {
+Result<Opened> Open(const std::filesystem::path& path, const PictureLimit& limit) {
   try {
-    return DecodeUnguarded(path, encoding);
+    return OpenUnguarded(path, limit);
+  } catch (const std::bad_alloc&) {
+    return Fail(ErrorCode::kOutOfMemory, "{}: out of memory while its header was read",
+                path.string());
+  } catch (const std::exception& error) {
+    return Undecodable(path, error.what());
+  }
+}
+
+Result<Decoded> Decode(const std::filesystem::path& path, Encoding encoding,
+                       const PictureLimit& limit) {
+  Result<Opened> opened = Open(path, limit);
+  if (!opened) {
+    return tl::unexpected(opened.error());
+  }
+  try {
+    return DecodeOpened(path, *opened->input, encoding);
+  } catch (const std::bad_alloc&) {
+    const OIIO::ImageSpec& spec = opened->input->spec();
+    return OutOfMemory(path, {spec.width, spec.height}, spec.image_bytes(true));
   } catch (const std::exception& error) {
     return Undecodable(path, error.what());
   }
@@ -229,8 +256,9 @@ Result<Decoded> Decode(const std::filesystem::path& path, Encoding encoding) {
 
 }  // namespace
 
-Result<Photo> ReadPhoto(const std::filesystem::path& path, Encoding encoding) {
-  Result<Decoded> decoded = Decode(path, encoding);
+Result<Photo> ReadPhoto(const std::filesystem::path& path, Encoding encoding,
+                        const PictureLimit& limit) {
+  Result<Decoded> decoded = Decode(path, encoding, limit);
   if (!decoded) {
     return tl::unexpected(decoded.error());
   }
@@ -243,8 +271,14 @@ Result<Photo> ReadPhoto(const std::filesystem::path& path, Encoding encoding) {
   return photo;
 }
 
-Result<Image3> ReadImage3(const std::filesystem::path& path) {
-  Result<Decoded> decoded = Decode(path, Encoding::kLinear);
+Result<ImageSize> ReadPhotoSize(const std::filesystem::path& path, const PictureLimit& limit) {
+  return Open(path, limit).map([](const Opened& opened) {
+    return ImageSize{opened.input->spec().width, opened.input->spec().height};
+  });
+}
+
+Result<Image3> ReadImage3(const std::filesystem::path& path, const PictureLimit& limit) {
+  Result<Decoded> decoded = Decode(path, Encoding::kLinear, limit);
   if (!decoded) {
     return tl::unexpected(decoded.error());
   }
@@ -255,8 +289,8 @@ Result<Image3> ReadImage3(const std::filesystem::path& path) {
   return std::move(decoded->rgb);
 }
 
-Result<Mask> ReadMask(const std::filesystem::path& path) {
-  const Result<Decoded> decoded = Decode(path, Encoding::kLinear);
+Result<Mask> ReadMask(const std::filesystem::path& path, const PictureLimit& limit) {
+  const Result<Decoded> decoded = Decode(path, Encoding::kLinear, limit);
   if (!decoded) {
     return tl::unexpected(decoded.error());
   }

@@ -8,6 +8,7 @@
 
 #include "core/error.h"
 #include "imaging/image.h"
+#include "imaging/picture_limit.h"
 
 namespace sateen {
 
@@ -29,18 +30,26 @@ struct Photo {
 /// two channels as grey, three or four as RGB; the last of two or four (alpha) is not applied.
 /// Float samples come as stored, infinities and NaN too. Of several pictures in a file the first.
 ///
-/// Errors   kIo: the file is absent or unreadable
+/// Errors   kIo: as InputFile::Open()
 ///          kBadData: not an image, cut short, other sample types or channel counts, an EXR whose
-///          data window is not its display window, more than 2^31 pixels
+///          data window is not its display window, a size that `limit` refuses
+///          kOutOfMemory: with the size that was needed
 [[nodiscard]] Result<Photo> ReadPhoto(const std::filesystem::path& path,
-                                      Encoding encoding = Encoding::kAuto);
+                                      Encoding encoding = Encoding::kAuto,
+                                      const PictureLimit& limit = {});
+
+// Returns the size of a picture by its header; no pixel is decoded. Errors as ReadPhoto().
+[[nodiscard]] Result<ImageSize> ReadPhotoSize(const std::filesystem::path& path,
+                                              const PictureLimit& limit = {});
 
 // Reads three planes for normal maps and other data: floats exactly as stored, integers as a
 // fraction of full scale. Fails with kBadData unless the file has three or four channels.
-[[nodiscard]] Result<Image3> ReadImage3(const std::filesystem::path& path);
+[[nodiscard]] Result<Image3> ReadImage3(const std::filesystem::path& path,
+                                        const PictureLimit& limit = {});
 
 // Reads 255 where any colour channel is at least half of full scale (1 for floats), otherwise 0.
-[[nodiscard]] Result<Mask> ReadMask(const std::filesystem::path& path);
+[[nodiscard]] Result<Mask> ReadMask(const std::filesystem::path& path,
+                                    const PictureLimit& limit = {});
 
 // Returns true for the file name endings that ReadPhoto reads.
 [[nodiscard]] bool IsPhotoName(const std::filesystem::path& path);

@@ -7,10 +7,12 @@
 #include <exception>
 #include <functional>
 #include <memory>
+#include <new>
 #include <string_view>
 #include <utility>
 
 #include "core/check.h"
+#include "core/input_file.h"
 #include "imaging/file_check.h"
 
 namespace sateen {
@@ -38,19 +40,6 @@ Status CheckDecoded(const std::filesystem::path& path, LibRaw& raw, int open_or_
               open_or_unpack != LIBRAW_SUCCESS ? LibRaw::strerror(open_or_unpack)
                                                : fmt::format("{} damaged samples", damaged).c_str(),
               LibRaw::version());
-}
-
-// Checks the size before room is made for the samples.
-Status CheckFits(const std::filesystem::path& path, const libraw_image_sizes_t& sizes,
-                 uint64_t file_bytes) {
-  const uint64_t bytes = uint64_t{sizes.raw_width} * sizes.raw_height * sizeof(uint16_t);
-  if (bytes / kMaxCompression > file_bytes) {
-    return Fail(ErrorCode::kBadData,
-                "{}: its header says {} x {} sites, which {} bytes cannot hold; the file is "
-                "damaged or cut short",
-                path.string(), sizes.raw_width, sizes.raw_height, file_bytes);
-  }
-  return {};
 }
 
 // Returns what keeps the file from being one integer sample per site under a 2x2 red, green, blue
@@ -181,40 +170,84 @@ RawMosaic FractionsOf(const RawReadings& readings) {
 
 using TakeDecoded = std::function<Status(const RawReadings&, const libraw_data_t&)>;
 
-Status DecodeUnguarded(const std::filesystem::path& path, const TakeDecoded& take) {
-  const Result<FileHead> head = ReadFileHead(path);
-  if (!head) {
-    return tl::unexpected(head.error());
+// A file whose header is read and allowed.
+struct Opened {
+  InputFile file;               // as long as `raw` reads it
+  std::unique_ptr<LibRaw> raw;  // too large for a stack
+
+  [[nodiscard]] ImageSize Size() const {
+    return {raw->imgdata.sizes.width, raw->imgdata.sizes.height};
   }
-  if (IsTiffHead(head->bytes)) {
-    if (Status whole = CheckTiffIsWhole(path); !whole) {
-      return whole;
-    }
-  }
-  const auto raw = std::make_unique<LibRaw>(LIBRAW_OPTIONS_NONE);  // too large for a stack
-  raw->set_dataerror_handler(nullptr, nullptr);                    // it would print to stderr
-  int status = raw->open_file(path.string().c_str());
-  if (status == LIBRAW_SUCCESS) {
-    if (Status fits = CheckFits(path, raw->imgdata.sizes, head->file_bytes); !fits) {
-      return fits;
-    }
-    status = raw->unpack();
-  }
-  if (Status decoded = CheckDecoded(path, *raw, status); !decoded) {
-    return decoded;
-  }
-  return ReadingsOf(path, *raw).and_then([&](const RawReadings& readings) {
-    return take(readings, raw->imgdata);
+};
+
+// Both the visible area and all sites are checked: room is made for all.
+Status CheckLimit(const std::filesystem::path& path, const Opened& opened,
+                  const PictureLimit& limit) {
+  const libraw_image_sizes_t& sizes = opened.raw->imgdata.sizes;
+  return limit.Check(path, opened.Size(), opened.file.Bytes()).and_then([&] {
+    const PictureLimit of_sites{.max_pixels = limit.max_pixels};
+    return of_sites.Check(path, {sizes.raw_width, sizes.raw_height}, opened.file.Bytes());
   });
 }
 
-Status Decode(const std::filesystem::path& path, const TakeDecoded& take) {
+Result<Opened> Open(const std::filesystem::path& path, const PictureLimit& limit) {
+  Result<InputFile> file = InputFile::Open(path);
+  if (!file) {
+    return tl::unexpected(file.error());
+  }
+  const Result<std::string> head = ReadHead(*file);
+  if (!head) {
+    return tl::unexpected(head.error());
+  }
+  if (IsTiffHead(*head)) {
+    if (Status whole = CheckTiffIsWhole(*file); !whole) {
+      return tl::unexpected(whole.error());
+    }
+  }
+  Opened opened{*std::move(file), std::make_unique<LibRaw>(LIBRAW_OPTIONS_NONE)};
+  opened.raw->set_dataerror_handler(nullptr, nullptr);  // it would print to stderr
+  const int status = opened.raw->open_file(opened.file.LibraryName().c_str());
+  if (status != LIBRAW_SUCCESS) {
+    return tl::unexpected(CheckDecoded(path, *opened.raw, status).error());
+  }
+  if (Status allowed = CheckLimit(path, opened, limit); !allowed) {
+    return tl::unexpected(allowed.error());
+  }
+  return opened;
+}
+
+Status Unpack(const std::filesystem::path& path, Opened& opened) {
+  const int status = opened.raw->unpack();
+  if (status == LIBRAW_UNSUFFICIENT_MEMORY) {
+    throw std::bad_alloc();
+  }
+  return CheckDecoded(path, *opened.raw, status);
+}
+
+// Calls `use` with the opened file, and turns what is thrown into errors.
+Status WithOpened(const std::filesystem::path& path, const PictureLimit& limit,
+                  const std::function<Status(Opened&)>& use) {
+  ImageSize size_px;
   try {
-    return DecodeUnguarded(path, take);
+    return Open(path, limit).and_then([&](Opened opened) {
+      size_px = opened.Size();
+      return use(opened);
+    });
+  } catch (const std::bad_alloc&) {
+    return OutOfMemory(path, size_px, sizeof(uint16_t) * size_px.PixelCount());
   } catch (const std::exception& error) {
     return Fail(ErrorCode::kBadData, "{}: cannot be decoded as camera RAW: {}", path.string(),
                 error.what());
   }
+}
+
+Status Decode(const std::filesystem::path& path, const PictureLimit& limit,
+              const TakeDecoded& take) {
+  return WithOpened(path, limit, [&](Opened& opened) {
+    return Unpack(path, opened)
+        .and_then([&] { return ReadingsOf(path, *opened.raw); })
+        .and_then([&](const RawReadings& readings) { return take(readings, opened.raw->imgdata); });
+  });
 }
 
 // The rows above, at and below a pixel, mirrored at the border; likewise its columns.
@@ -255,9 +288,9 @@ bool IsRawName(const std::filesystem::path& path) {
   return std::ranges::find(kEndings, ending) != kEndings.end();
 }
 
-Result<RawMosaic> ReadRawMosaic(const std::filesystem::path& path) {
+Result<RawMosaic> ReadRawMosaic(const std::filesystem::path& path, const PictureLimit& limit) {
   RawMosaic mosaic;
-  return Decode(path,
+  return Decode(path, limit,
                 [&](const RawReadings& readings, const libraw_data_t& data) {
                   mosaic = FractionsOf(readings);
                   FillMetadata(data, mosaic);
@@ -266,9 +299,20 @@ Result<RawMosaic> ReadRawMosaic(const std::filesystem::path& path) {
       .map([&] { return std::move(mosaic); });
 }
 
+Result<ImageSize> ReadRawSize(const std::filesystem::path& path, const PictureLimit& limit) {
+  ImageSize size_px;
+  return WithOpened(path, limit,
+                    [&](const Opened& opened) {
+                      size_px = opened.Size();
+                      return Status();
+                    })
+      .map([&] { return size_px; });
+}
+
 Status TakeRawReadings(const std::filesystem::path& path,
-                       const std::function<Status(const RawReadings&)>& take) {
-  return Decode(path, [&](const RawReadings& readings, const libraw_data_t& /*data*/) {
+                       const std::function<Status(const RawReadings&)>& take,
+                       const PictureLimit& limit) {
+  return Decode(path, limit, [&](const RawReadings& readings, const libraw_data_t& /*data*/) {
     return take(readings);
   });
 }

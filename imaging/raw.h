@@ -10,6 +10,7 @@
 
 #include "core/error.h"
 #include "imaging/image.h"
+#include "imaging/picture_limit.h"
 
 namespace sateen {
 
@@ -48,14 +49,23 @@ struct RawReadings {
 /// Decodes a camera RAW file (through LibRaw): no auto brightness, no white balance, no
 /// colour matrix; black and white level applied.
 ///
-/// Errors   kIo: the file is absent or unreadable
-///          kBadData: not a RAW file that can be decoded, cut short, or its CFA is not 2x2 Bayer
-[[nodiscard]] Result<RawMosaic> ReadRawMosaic(const std::filesystem::path& path);
+/// Errors   kIo: as InputFile::Open()
+///          kBadData: not a RAW file that can be decoded, cut short, its CFA is not 2x2 Bayer, or a
+///          size that `limit` refuses
+///          kOutOfMemory: with the size that was needed
+[[nodiscard]] Result<RawMosaic> ReadRawMosaic(const std::filesystem::path& path,
+                                              const PictureLimit& limit = {});
+
+// Returns the size of the visible area by the file's header; no sample is decoded. Errors as
+// ReadRawMosaic().
+[[nodiscard]] Result<ImageSize> ReadRawSize(const std::filesystem::path& path,
+                                            const PictureLimit& limit = {});
 
 // Decodes as ReadRawMosaic, and hands `take` the readings, which are gone when it returns. Nothing
 // of the image's size is kept beside what the decoder needs. Errors of `take` are passed on.
 [[nodiscard]] Status TakeRawReadings(const std::filesystem::path& path,
-                                     const std::function<Status(const RawReadings&)>& take);
+                                     const std::function<Status(const RawReadings&)>& take,
+                                     const PictureLimit& limit = {});
 
 // Returns camera RGB at every pixel. Bilinear: the mean of the nearest sites of each colour;
 // measured values are kept as they are at their own sites. At the border the mosaic continues as

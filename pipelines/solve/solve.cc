@@ -17,6 +17,10 @@ std::optional<std::filesystem::path> IfGiven(const std::filesystem::path& path) 
   return path.empty() ? std::nullopt : std::optional(path);
 }
 
+std::optional<int64_t> PixelsOf(const std::optional<int>& megapixels) {
+  return megapixels ? std::optional(int64_t{1'000'000} * *megapixels) : std::nullopt;
+}
+
 Domain DomainToRead(const SolveOptions& options) {
   const bool is_auto = options.domain == Domain::kAuto;
   return is_auto && !SolvesMosaics(options.least_squares.backend) ? Domain::kRgb : options.domain;
@@ -32,7 +36,8 @@ Result<Dataset> ReadForSolve(const SolveOptions& options, const Task& task) {
                                          .encoding = options.encoding,
                                          .domain = DomainToRead(options),
                                          .by_noise = options.robust.has_value(),
-                                         .scratch_dir = options.output},
+                                         .scratch_dir = options.output,
+                                         .max_pixels = PixelsOf(options.max_megapixels)},
                                         task);
   if (!dataset) {
     return dataset;

@@ -39,6 +39,8 @@ struct SolveOptions {
   // Simulated session whose truth the maps are compared with; empty: what lies beside the capture.
   std::filesystem::path truth_dir;
   Encoding encoding = Encoding::kAuto;
+  // Pixels that the first frame may have whatever the length of its file, in millions.
+  std::optional<int> max_megapixels;
   Domain domain = Domain::kAuto;
   // Rungs of the ladder; absent: least squares without weights and without uncertainty.
   std::optional<LadderMode> robust = LadderMode::kAuto;

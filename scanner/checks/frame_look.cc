@@ -31,7 +31,7 @@ BlockGrid GridOf(const Rig& rig) {
 // Reads everything that the checks need of a frame, decoding it once.
 Result<FrameLook> LookAt(const FrameFile& file, const BlockGrid& grid) {
   if (IsRawName(file.path)) {
-    return ReadRawMosaic(file.path).and_then([&](const RawMosaic& mosaic) {
+    return ReadRawMosaic(file.path, file.limit).and_then([&](const RawMosaic& mosaic) {
       return ReadingOf(file, mosaic).and_then([&](const SensorReading& reading) {
         return BlockMeansOf(file, mosaic, reading, grid).map([&](BlockMeans means) {
           FrameLook look{.means = std::move(means), .levels = LevelsOf(mosaic, reading)};
@@ -41,7 +41,7 @@ Result<FrameLook> LookAt(const FrameFile& file, const BlockGrid& grid) {
       });
     });
   }
-  return ReadPhoto(file.path).and_then([&](const Photo& photo) {
+  return ReadPhoto(file.path, Encoding::kAuto, file.limit).and_then([&](const Photo& photo) {
     return BlockMeansOf(file, photo, grid).map([&](BlockMeans means) {
       FrameLook look{.means = std::move(means), .levels = LevelsOf(photo)};
       for (const Image<float>& plane : photo.rgb.planes) {

@@ -71,9 +71,11 @@ SignalLevels LevelsOf(const Photo& photo) {
 
 Result<SignalLevels> ReadSignalLevels(const FrameFile& file) {
   if (!IsRawName(file.path)) {
-    return ReadPhoto(file.path).map([](const Photo& photo) { return LevelsOf(photo); });
+    return ReadPhoto(file.path, Encoding::kAuto, file.limit).map([](const Photo& photo) {
+      return LevelsOf(photo);
+    });
   }
-  return ReadRawMosaic(file.path).and_then([&](const RawMosaic& mosaic) {
+  return ReadRawMosaic(file.path, file.limit).and_then([&](const RawMosaic& mosaic) {
     return ReadingOf(file, mosaic).map([&](const SensorReading& reading) {
       return LevelsOf(mosaic, reading);
     });

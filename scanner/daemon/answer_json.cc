@@ -16,14 +16,15 @@ using std::chrono::milliseconds;
 using std::chrono::system_clock;
 
 constexpr std::string_view kAnswer = "answer of the daemon";
-constexpr std::array<std::pair<ErrorCode, std::string_view>, 7> kCodes = {
+constexpr std::array<std::pair<ErrorCode, std::string_view>, 8> kCodes = {
     {{ErrorCode::kInvalidArgument, "invalid-argument"},
      {ErrorCode::kBadData, "bad-data"},
      {ErrorCode::kDegenerate, "degenerate"},
      {ErrorCode::kIo, "io"},
      {ErrorCode::kDevice, "device"},
      {ErrorCode::kTimeout, "timeout"},
-     {ErrorCode::kCancelled, "cancelled"}}};
+     {ErrorCode::kCancelled, "cancelled"},
+     {ErrorCode::kOutOfMemory, "out-of-memory"}}};
 
 // Writes JSON as one line. Messages echo requests and paths, which need not be UTF-8.
 std::string OneLine(const ordered_json& json) { return JsonText(json); }

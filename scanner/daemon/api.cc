@@ -102,6 +102,7 @@ int HttpStatus(ErrorCode code) {
     case ErrorCode::kDegenerate:
       return 422;
     case ErrorCode::kIo:
+    case ErrorCode::kOutOfMemory:
       return 500;
     case ErrorCode::kTimeout:
       return 504;

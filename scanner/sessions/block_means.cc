@@ -148,12 +148,12 @@ Result<BlockMeans> ReadBlockMeans(const FrameFile& file, const BlockGrid& grid) 
   }
   Result<BlockMeans> means =
       IsRawName(file.path)
-          ? ReadRawMosaic(file.path).and_then([&](const RawMosaic& mosaic) {
+          ? ReadRawMosaic(file.path, file.limit).and_then([&](const RawMosaic& mosaic) {
               return ReadingOf(file, mosaic).and_then([&](const SensorReading& reading) {
                 return BlockMeansOf(file, mosaic, reading, grid);
               });
             })
-          : ReadPhoto(file.path, Encoding::kAuto).and_then([&](const Photo& photo) {
+          : ReadPhoto(file.path, Encoding::kAuto, file.limit).and_then([&](const Photo& photo) {
               return BlockMeansOf(file, photo, grid);
             });
   if (means) {

@@ -89,11 +89,11 @@ Image<float> GreyOf(const Image3& rgb, float scale) {
 Result<GreyLight> ReadLight(const FrameFile& file) {
   const auto per_exposure = static_cast<float>(1.0 / file.exposure);
   if (IsRawName(file.path)) {
-    return ReadRawMosaic(file.path).map([&](const RawMosaic& mosaic) {
+    return ReadRawMosaic(file.path, file.limit).map([&](const RawMosaic& mosaic) {
       return GreyLight{GreyOf(Demosaic(mosaic, mosaic.camera_white_balance), per_exposure)};
     });
   }
-  const Result<Photo> photo = ReadPhoto(file.path, Encoding::kAuto);
+  const Result<Photo> photo = ReadPhoto(file.path, Encoding::kAuto, file.limit);
   if (!photo) {
     return tl::unexpected(photo.error());
   }

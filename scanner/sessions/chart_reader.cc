@@ -139,7 +139,7 @@ class ChartReader {
       if (Status status = task_.CheckCancelled(); !status) {
         return status;
       }
-      const Result<RawMosaic> mosaic = ReadRawMosaic(files_[f].file.path);
+      const Result<RawMosaic> mosaic = ReadRawMosaic(files_[f].file.path, files_[f].file.limit);
       if (!mosaic) {
         return tl::unexpected(mosaic.error());
       }
@@ -196,7 +196,7 @@ class ChartReader {
     }
     sha256 = *std::move(hash);
     const std::string path = chart_file.file.path.string();
-    const Result<RawMosaic> mosaic = ReadRawMosaic(chart_file.file.path);
+    const Result<RawMosaic> mosaic = ReadRawMosaic(chart_file.file.path, chart_file.file.limit);
     if (!mosaic) {
       return tl::unexpected(mosaic.error());
     }

@@ -1,10 +1,12 @@
 #include "scanner/sessions/dataset.h"
 
 #include <algorithm>
+#include <limits>
 #include <set>
 #include <utility>
 
 #include "core/sha256.h"
+#include "imaging/raw.h"
 #include "scanner/sessions/files/folder_listing.h"
 #include "scanner/sessions/frame_loader.h"
 #include "scanner/sessions/lp_layout.h"
@@ -174,16 +176,20 @@ Status CheckLitFrames(const fs::path& path, const ReadPlan& plan) {
 
 Status ReadMaskInto(const ReadPlan& plan, Dataset& dataset) {
   const std::string name = plan.mask->string();
-  Result<Mask> mask = ReadMask(*plan.mask);
-  if (!mask) {
-    return tl::unexpected(mask.error());
-  }
-  if (Status status = CheckSize(name, mask->Size(), dataset.Size()); !status) {
-    if (plan.mask_is_shared) {
-      dataset.warnings.push_back("the mask is not used: " + status.error().message);
+  if (plan.mask_is_shared) {
+    const PictureLimit any_size{.max_pixels = std::numeric_limits<int64_t>::max()};
+    const Result<ImageSize> size = ReadPhotoSize(*plan.mask, any_size);
+    if (!size) {
+      return tl::unexpected(size.error());
+    }
+    if (const Status same = CheckSize(name, *size, dataset.Size()); !same) {
+      dataset.warnings.push_back("the mask is not used: " + same.error().message);
       return {};
     }
-    return status;
+  }
+  Result<Mask> mask = ReadMask(*plan.mask, {.size_px = dataset.Size()});
+  if (!mask) {
+    return tl::unexpected(mask.error());
   }
   if (std::all_of(mask->pixels.begin(), mask->pixels.end(), [](uint8_t m) { return m == 0; })) {
     return Fail(ErrorCode::kBadData,
@@ -214,6 +220,27 @@ Status CheckCamera(const Dataset& dataset) {
     return Fail(ErrorCode::kBadData,
                 "{}: is {} x {} px but the rig's camera has {} x {} px; need the camera's size",
                 dataset.FirstName(), size.width, size.height, camera.width, camera.height);
+  }
+  return {};
+}
+
+// Bounds the first frame by `max_pixels`, and all by its size.
+Status LimitFrames(std::optional<int64_t> max_pixels, ReadPlan& plan) {
+  const FrameFile& first = plan.lit.front().front();
+  const PictureLimit limit{.max_pixels = max_pixels};
+  const Result<ImageSize> size_px =
+      IsRawName(first.path) ? ReadRawSize(first.path, limit) : ReadPhotoSize(first.path, limit);
+  if (!size_px) {
+    return tl::unexpected(size_px.error());
+  }
+  const auto limit_to_size = [&](FrameFile& file) { file.limit.size_px = *size_px; };
+  for (LightFiles& files : plan.lit) {
+    std::ranges::for_each(files, limit_to_size);
+  }
+  std::ranges::for_each(plan.dark, limit_to_size);
+  if (plan.repeated) {
+    limit_to_size(plan.repeated->first);
+    limit_to_size(plan.repeated->again);
   }
   return {};
 }
@@ -280,7 +307,10 @@ Result<Dataset> ReadDataset(const fs::path& path, const ReadDatasetOptions& opti
   if (const Status status = SelectLights(options.lights, *plan); !status) {
     return tl::unexpected(status.error());
   }
-  if (const Status status = CheckLitFrames(path, *plan); !status) {
+  if (const Status status = CheckLitFrames(path, *plan).and_then([&] {
+        return LimitFrames(options.max_pixels, *plan);
+      });
+      !status) {
     return tl::unexpected(status.error());
   }
   Dataset dataset;

@@ -63,6 +63,9 @@ struct ReadDatasetOptions {
   // Whether mosaics are weighed by the sensor's noise, so that FindSensorNoise() is asked.
   bool by_noise = true;
   std::filesystem::path scratch_dir = {};  // LoadMosaics()
+  // Pixels of the first frame in place of the bound by its bytes (imaging/picture_limit.h). The
+  // others must have its size.
+  std::optional<int64_t> max_pixels = std::nullopt;
 };
 
 /// Reads a dataset as it is: a folder with session.json (docs/formats.md), a DiLiGenT folder, an

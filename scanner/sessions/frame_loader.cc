@@ -82,15 +82,6 @@ Result<std::string> CheckedHash(const FrameFile& file) {
   return hash;
 }
 
-Status CheckSize(const std::string& what, ImageSize size, ImageSize frame_size) {
-  if (size == frame_size) {
-    return {};
-  }
-  return Fail(ErrorCode::kBadData,
-              "{}: is {} x {} px, but the first frame is {} x {} px; need one size", what,
-              size.width, size.height, frame_size.width, frame_size.height);
-}
-
 Result<LoadedFrames> LoadFrames(const std::vector<LightFiles>& lit,
                                 const std::vector<FrameFile>& dark, Encoding encoding,
                                 const Task& task) {

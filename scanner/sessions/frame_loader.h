@@ -49,7 +49,4 @@ struct LoadedFrames {
 // Returns the SHA-256 of the file. kBadData where the session recorded another.
 [[nodiscard]] Result<std::string> CheckedHash(const FrameFile& file);
 
-// Fails with kBadData unless `size` is that of the frames. `what` opens the message: the file.
-[[nodiscard]] Status CheckSize(const std::string& what, ImageSize size, ImageSize frame_size);
-
 }  // namespace sateen

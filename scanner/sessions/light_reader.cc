@@ -54,7 +54,7 @@ Result<LightFrame> DevelopSeveral(const LightFiles& files) {
   ImageSize size_px;
   SensorReading reading;
   for (const FrameFile& file : files) {
-    Result<RawMosaic> mosaic = ReadRawMosaic(file.path);
+    Result<RawMosaic> mosaic = ReadRawMosaic(file.path, file.limit);
     if (!mosaic) {
       return tl::unexpected(mosaic.error());
     }
@@ -100,7 +100,7 @@ Result<LightFrame> MergePhotos(const LightFiles& files, Encoding encoding, bool&
   frame.merged = files.size() > 1;
   std::optional<float> saturation;
   for (const FrameFile& file : files) {
-    const Result<Photo> photo = ReadPhoto(file.path, encoding);
+    const Result<Photo> photo = ReadPhoto(file.path, encoding, file.limit);
     if (!photo) {
       return tl::unexpected(photo.error());
     }
@@ -169,7 +169,7 @@ Result<LightReading> ReadLight(const LightFiles& files, Encoding encoding) {
   } else if (files.size() > 1) {
     frame = DevelopSeveral(files);
   } else {
-    frame = ReadRawMosaic(first.path).and_then([&](RawMosaic mosaic) {
+    frame = ReadRawMosaic(first.path, first.limit).and_then([&](RawMosaic mosaic) {
       return DevelopOne(first, std::move(mosaic));
     });
   }

@@ -201,7 +201,7 @@ Status DecodeFrame(size_t k, const fs::path& scratch_dir, Decoding& decoding) {
     return tl::unexpected(hash.error());
   }
   decoding.hashes[k] = *std::move(hash);
-  return TakeRawReadings(file.path, [&](const RawReadings& readings) -> Status {
+  const auto take = [&](const RawReadings& readings) -> Status {
     if (k == 0) {
       decoding.size_px = readings.size_px;
       decoding.cfa = readings.cfa;
@@ -224,7 +224,8 @@ Status DecodeFrame(size_t k, const fs::path& scratch_dir, Decoding& decoding) {
       status = decoding.store->Put(k, row, readings.Row(row));
     }
     return status;
-  });
+  };
+  return TakeRawReadings(file.path, take, file.limit);
 }
 
 Status DecodeAll(const fs::path& scratch_dir, const Task& task, Decoding& decoding) {

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "imaging/picture_limit.h"
 #include "rig/rig.h"
 #include "scanner/sessions/session.h"
 #include "scanner/sessions/truth.h"
@@ -23,6 +24,8 @@ struct FrameFile {
   std::optional<Response> response = std::nullopt;
   // Shift of its picture from the first light's frame: a point at x there is at x + shift_px here.
   Eigen::Vector2d shift_px = Eigen::Vector2d::Zero();
+  // Bounds of its picture, by which it is refused before its pixels are decoded.
+  PictureLimit limit = {};
 };
 
 // Lit frames of one light: one, or several with different exposures, the longest first.

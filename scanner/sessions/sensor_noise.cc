@@ -142,18 +142,18 @@ void LeaveOutWhatMoved(std::vector<TransferPoint>& points) {
 Result<std::vector<TransferPoint>> PointsOf(const FrameFile& first, const FrameFile& again,
                                             bool is_dark) {
   std::vector<TransferPoint> points;
-  const Status read = TakeRawReadings(first.path, [&](const RawReadings& a) {
-    return TakeRawReadings(again.path, [&](const RawReadings& b) {
-      if (Status same = CheckSize(again.path.string(), b.size_px, a.size_px); !same) {
-        return same;
-      }
-      const std::array<std::vector<TileNoise>, 3> tiles = NoiseOfTiles(a, b);
-      for (size_t c = 0; c < 3; ++c) {
-        AddGroups(tiles[c], c, is_dark, points);
-      }
-      return Status();
-    });
-  });
+  const auto compare = [&](const RawReadings& a, const RawReadings& b) {
+    const std::array<std::vector<TileNoise>, 3> tiles = NoiseOfTiles(a, b);
+    for (size_t c = 0; c < 3; ++c) {
+      AddGroups(tiles[c], c, is_dark, points);
+    }
+    return Status();
+  };
+  const auto take_first = [&](const RawReadings& a) {
+    const auto take_again = [&](const RawReadings& b) { return compare(a, b); };
+    return TakeRawReadings(again.path, take_again, {.size_px = a.size_px});
+  };
+  const Status read = TakeRawReadings(first.path, take_first, first.limit);
   return read.map([&] { return std::move(points); });
 }
 

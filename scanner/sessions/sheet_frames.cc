@@ -70,10 +70,11 @@ Image<float> Joined(const Image<float>& full, int shrink, double exposure) {
 Result<Image<float>> ReadOne(const FrameFile& file, int shrink) {
   const auto joined = [&](const Image<float>& full) { return Joined(full, shrink, file.exposure); };
   if (IsRawName(file.path)) {
-    return ReadRawMosaic(file.path).map(
-        [&](RawMosaic mosaic) { return joined(BalancedMosaic(std::move(mosaic))); });
+    return ReadRawMosaic(file.path, file.limit).map([&](RawMosaic mosaic) {
+      return joined(BalancedMosaic(std::move(mosaic)));
+    });
   }
-  return ReadPhoto(file.path, Encoding::kAuto).map([&](const Photo& photo) {
+  return ReadPhoto(file.path, Encoding::kAuto, file.limit).map([&](const Photo& photo) {
     return joined(GreyOf(photo));
   });
 }

@@ -8,11 +8,10 @@
 #include <memory>
 #include <string_view>
 
-#include "core/file_io.h"
+#include "core/input_file.h"
 #include "core/sha256.h"
 #include "imaging/image_io.h"
 #include "scanner/sessions/files/folder_listing.h"
-#include "scanner/sessions/frame_loader.h"
 
 namespace sateen {
 namespace {
@@ -50,51 +49,77 @@ uint32_t LittleEndian32(std::string_view bytes, size_t at) {
 // Fails unless the file is whole: matio gives zeros for what is missing at the end of a file. A
 // MATLAB 5 file is 128 bytes, the last two "IM", then elements of 8 bytes (type, length) and
 // `length` bytes each, to its end.
-Status CheckMatWhole(const fs::path& path) {
-  const Result<std::string> bytes = ReadFileBytes(path);
-  if (!bytes) {
-    return tl::unexpected(bytes.error());
+Status CheckMatWhole(const InputFile& file) {
+  constexpr int kMaxElements = 1000;  // one for each variable
+  std::string magic(128, '\0');
+  Result<size_t> count = file.ReadAt(0, magic);
+  if (!count) {
+    return tl::unexpected(count.error());
   }
-  const std::string_view magic = std::string_view(*bytes).substr(0, 128);
   if (!magic.starts_with("MATLAB 5.0") || !magic.ends_with("IM")) {
     return Fail(ErrorCode::kBadData,
                 "{}: is not a little-endian MATLAB 5 file; need one, as `save -v7` writes it",
-                path.string());
+                file.Path().string());
   }
-  size_t end = magic.size();
-  while (end + 8 <= bytes->size()) {
-    end += 8 + size_t{LittleEndian32(*bytes, end + 4)};
+  uint64_t end = magic.size();
+  for (int element = 0; end + 8 <= file.Bytes() && element < kMaxElements; ++element) {
+    std::string head(8, '\0');
+    count = file.ReadAt(end, head);
+    if (!count) {
+      return tl::unexpected(count.error());
+    }
+    end += 8 + uint64_t{LittleEndian32(head, 4)};
   }
-  if (end != bytes->size() || end == magic.size()) {
+  if (end != file.Bytes() || end == magic.size()) {
     return Fail(ErrorCode::kBadData, "{}: the MATLAB file is cut short at {} bytes; copy it again",
-                path.string(), bytes->size());
+                file.Path().string(), file.Bytes());
   }
   return {};
 }
 
-Result<Image3> ReadMatNormals(const fs::path& path) {
-  if (const Status status = CheckMatWhole(path); !status) {
-    return tl::unexpected(status.error());
-  }
-  const MatFile file(Mat_Open(path.c_str(), MAT_ACC_RDONLY), Mat_Close);
-  if (file == nullptr) {
-    return Fail(ErrorCode::kBadData, "{}: cannot be read as a MATLAB file", path.string());
-  }
-  const MatVariable variable(Mat_VarRead(file.get(), kVariable), Mat_VarFree);
+// Reads the variable's header, then its values if the header fits.
+Result<Image3> ReadMatVariable(const fs::path& path, mat_t* file, ImageSize size_px) {
+  const MatVariable variable(Mat_VarReadInfo(file, kVariable), Mat_VarFree);
   if (variable == nullptr) {
     return Fail(ErrorCode::kBadData, "{}: has no readable variable {}, which holds the normals",
                 path.string(), kVariable);
   }
   const bool is_field = variable->rank == 3 && variable->dims[2] == 3;
-  const bool is_double = variable->class_type == MAT_C_DOUBLE &&
-                         variable->data_type == MAT_T_DOUBLE && variable->isComplex == 0;
-  if (!is_field || !is_double || variable->data == nullptr ||
-      variable->nbytes != variable->dims[0] * variable->dims[1] * 3 * sizeof(double)) {
+  const bool is_double = variable->class_type == MAT_C_DOUBLE && variable->isComplex == 0;
+  if (!is_field || !is_double) {
     return Fail(ErrorCode::kBadData, "{}: {} is not an array of H x W x 3 real doubles",
                 path.string(), kVariable);
   }
-  return FromColumnMajor(static_cast<const double*>(variable->data), variable->dims[0],
-                         variable->dims[1]);
+  const size_t height = variable->dims[0];
+  const size_t width = variable->dims[1];
+  if (height != static_cast<size_t>(size_px.height) ||
+      width != static_cast<size_t>(size_px.width)) {
+    return Fail(ErrorCode::kBadData,
+                "{}: is {} x {} px, but the first frame is {} x {} px; need one size",
+                path.string(), width, height, size_px.width, size_px.height);
+  }
+  if (Mat_VarReadDataAll(file, variable.get()) != 0 || variable->data == nullptr ||
+      variable->data_type != MAT_T_DOUBLE ||
+      variable->nbytes != height * width * 3 * sizeof(double)) {
+    return Fail(ErrorCode::kBadData, "{}: {} is not an array of H x W x 3 real doubles",
+                path.string(), kVariable);
+  }
+  return FromColumnMajor(static_cast<const double*>(variable->data), height, width);
+}
+
+Result<Image3> ReadMatNormals(const fs::path& path, ImageSize size_px) {
+  const Result<InputFile> input = InputFile::Open(path);
+  if (!input) {
+    return tl::unexpected(input.error());
+  }
+  if (const Status status = CheckMatWhole(*input); !status) {
+    return tl::unexpected(status.error());
+  }
+  const MatFile file(Mat_Open(input->LibraryName().c_str(), MAT_ACC_RDONLY), Mat_Close);
+  if (file == nullptr) {
+    return Fail(ErrorCode::kBadData, "{}: cannot be read as a MATLAB file", path.string());
+  }
+  return ReadMatVariable(path, file.get(), size_px);
 }
 
 Status CheckNormals(const Image3& normal, const fs::path& path) {
@@ -124,14 +149,7 @@ Result<Image3> ReadPlanes(const fs::path& path, ImageSize size_px,
   }
   sha256_of_input[path.string()] = *std::move(hash);
   const bool is_mat = LowerCase(path.extension().string()) == ".mat";
-  Result<Image3> planes = is_mat ? ReadMatNormals(path) : ReadImage3(path);
-  if (!planes) {
-    return planes;
-  }
-  if (const Status status = CheckSize(path.string(), planes->Size(), size_px); !status) {
-    return tl::unexpected(status.error());
-  }
-  return planes;
+  return is_mat ? ReadMatNormals(path, size_px) : ReadImage3(path, {.size_px = size_px});
 }
 
 }  // namespace

@@ -441,25 +441,5 @@ TEST_F(WriteFileWholeTest, NeedsAFolderThatExistsAndTheNameOfAFile) {
   EXPECT_THAT(WriteFileWhole(temp_.Path(), "x").error().message, HasSubstr("is a folder"));
 }
 
-TEST(ReadFileBytes, GivesEveryByte) {
-  const testing::TempFolder folder;
-  std::string bytes(2'500'000, '\0');  // several pieces, with zeros and newlines
-  for (size_t i = 0; i < bytes.size(); ++i) {
-    bytes[i] = static_cast<char>(i % 251);
-  }
-  testing::WriteText(folder.Path() / "frame.raw", bytes);
-  EXPECT_EQ(ReadFileBytes(folder.Path() / "frame.raw").value(), bytes);
-}
-
-TEST(ReadFileBytes, NamesThePathAndTheReason) {
-  const testing::TempFolder folder;
-  const Result<std::string> of_folder = ReadFileBytes(folder.Path());
-  ASSERT_FALSE(of_folder);
-  EXPECT_EQ(of_folder.error().code, ErrorCode::kIo);
-  EXPECT_EQ(of_folder.error().message, folder.Path().string() + ": cannot read: Is a directory");
-  EXPECT_THAT(ReadFileBytes(folder.Path() / "no").error().message,
-              HasSubstr("/no: cannot read: No such file or directory"));
-}
-
 }  // namespace
 }  // namespace sateen::output_folder_test

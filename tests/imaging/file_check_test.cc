@@ -39,7 +39,7 @@ std::string TiledTiff(uint32_t tiles_listed) {
 Status CheckTiff(const std::string& bytes) {
   const TempFolder folder;
   WriteText(folder.Path() / "a.tif", bytes);
-  return CheckTiffIsWhole(folder.Path() / "a.tif");
+  return InputFile::Open(folder.Path() / "a.tif").and_then(CheckTiffIsWhole);
 }
 
 void ExpectBad(const Status& status, const std::string& words) {
@@ -88,6 +88,10 @@ TEST(CheckTiffIsWhole, EndsOnDirectoriesThatPointAtEachOther) {
   EXPECT_TRUE(CheckTiff(bytes + directory));
 }
 
+Status CheckPng(const std::filesystem::path& path) {
+  return InputFile::Open(path).and_then(CheckPngIsWhole);
+}
+
 TEST(CheckPngIsWhole, NeedsTheEndMark) {
   const TempFolder folder;
   const std::filesystem::path path = folder.Path() / "a.png";
@@ -95,19 +99,53 @@ TEST(CheckPngIsWhole, NeedsTheEndMark) {
   const std::string text("\0\0\0\x03tEXtabc\x01\x02\x03\x04", 15);
   const std::string end("\0\0\0\0IEND\xAE\x42\x60\x82", 12);
   WriteText(path, signature + text + end + "something after the picture");
-  EXPECT_TRUE(CheckPngIsWhole(path));
+  EXPECT_TRUE(CheckPng(path));
   WriteText(path, signature + text);
-  ExpectBad(CheckPngIsWhole(path), "has 23 bytes and needs at least 35");
+  ExpectBad(CheckPng(path), "has 23 bytes and needs at least 35");
   WriteText(path, signature + text + end.substr(0, 11));
-  ExpectBad(CheckPngIsWhole(path), "has 34 bytes and needs at least 35");
+  ExpectBad(CheckPng(path), "has 34 bytes and needs at least 35");
 }
 
-TEST(ReadFileHead, TellsTheStartAndTheLength) {
+// Every entry of a directory may name the same million values: the cost is bounded by their sum.
+TEST(CheckTiffIsWhole, RefusesMoreValuesThanAnyCameraWrites) {
+  constexpr uint32_t kEntries = 20;
+  std::string bytes("II*\0", 4);
+  Append(bytes, 8, 4);
+  Append(bytes, kEntries, 2);
+  for (uint32_t i = 0; i < kEntries; ++i) {
+    Append(bytes, 273, 2);  // strip offsets
+    Append(bytes, 4, 2);    // LONG
+    Append(bytes, 60000, 4);
+    Append(bytes, 300, 4);  // where they stand
+  }
+  Append(bytes, 0, 4);
+  bytes.resize(300 + 4 * 60000);
+  ExpectBad(CheckTiff(bytes), "more than 16384 entries or 1048576 values");
+}
+
+TEST(CheckTiffIsWhole, RefusesMoreEntriesThanAnyCameraWrites) {
+  std::string bytes("II*\0", 4);
+  Append(bytes, 8, 4);
+  Append(bytes, 20000, 2);
+  bytes.resize(10 + 12 * 20000 + 4);
+  ExpectBad(CheckTiff(bytes), "more than 16384 entries");
+}
+
+TEST(CheckPngIsWhole, RefusesMillionsOfChunks) {
+  const TempFolder folder;
+  std::string bytes = "\x89PNG\r\n\x1a\n";
+  bytes.resize(8 + 12 * ((1 << 20) + 10));
+  WriteText(folder.Path() / "a.png", bytes);
+  ExpectBad(CheckPng(folder.Path() / "a.png"), "more than 1048576 chunks");
+}
+
+TEST(ReadHead, TellsTheStart) {
   const TempFolder folder;
   WriteText(folder.Path() / "a", "0123456789abcdefXYZ");
-  const FileHead head = ReadFileHead(folder.Path() / "a").value();
-  EXPECT_EQ(head.bytes, "0123456789abcdef");
-  EXPECT_EQ(head.file_bytes, 19U);
+  EXPECT_EQ(InputFile::Open(folder.Path() / "a").and_then(ReadHead).value(), "0123456789abcdef");
+  WriteText(folder.Path() / "b", "");
+  const Result<std::string> head = InputFile::Open(folder.Path() / "b").and_then(ReadHead);
+  EXPECT_THAT(head.error().message, HasSubstr("b: is empty; copy it again"));
 }
 
 }  // namespace

@@ -150,7 +150,7 @@ TEST(ReadRawMosaic, RefusesSizesThatTheFileCannotHold) {
   }
   WriteText(folder.Path() / "a.dng", bytes);
 
-  ExpectBad(ReadRawMosaic(folder.Path() / "a.dng"), "its header says 60000 x 60000 sites");
+  ExpectBad(ReadRawMosaic(folder.Path() / "a.dng"), "its header says 60000 x 60000 pixels");
 }
 
 TEST(ReadRawMosaic, TellsAbsentFromBad) {

@@ -33,10 +33,20 @@ Result<std::vector<Circle>> ReadCircles(const std::filesystem::path& path, Image
       circles.push_back({{row.values[0], row.values[1]}, row.values[2]});
     }
   }
+  if (circles.size() > kMaxCircles) {
+    return Fail(ErrorCode::kBadData, "{}: {} circles; need at most {}", path.string(),
+                circles.size(), kMaxCircles);
+  }
   for (const Circle& circle : circles) {
-    if (!(circle.radius_px > 0.0)) {
-      return Fail(ErrorCode::kBadData, "{}: a radius of {} px; need one above 0", path.string(),
-                  circle.radius_px);
+    const double r = circle.radius_px;
+    const auto inside = [](double center, int side) { return center >= 0.0 && center < side; };
+    if (!(r > 0.0 && r <= std::max(size.width, size.height)) ||
+        !inside(circle.center_px.x(), size.width) || !inside(circle.center_px.y(), size.height)) {
+      return Fail(ErrorCode::kBadData,
+                  "{}: a circle about ({:.6g}, {:.6g}) of radius {:.6g} px; need one inside the "
+                  "picture of {} x {} px",
+                  path.string(), circle.center_px.x(), circle.center_px.y(), r, size.width,
+                  size.height);
     }
   }
   return circles;

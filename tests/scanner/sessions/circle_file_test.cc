@@ -35,7 +35,8 @@ TEST(CircleFile, ThreeLinesASphereCountFromOneAndFromBelow) {
 }
 
 TEST(CircleFile, RefusesWhatIsNoCircle) {
-  for (const char* wrong : {"", "1 2\n", "1 2 0\n", "1 2 -3\n", "1\n2\n3\n4\n"}) {
+  for (const char* wrong : {"", "1 2\n", "1 2 0\n", "1 2 -3\n", "1\n2\n3\n4\n", "1e308 80 55\n",
+                            "640 240 30\n", "-1 240 30\n", "320 480 30\n", "320 240 641\n"}) {
     const auto circles = Read(wrong);
     ASSERT_FALSE(circles) << wrong;
     EXPECT_EQ(circles.error().code, ErrorCode::kBadData);

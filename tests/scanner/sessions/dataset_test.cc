@@ -76,6 +76,26 @@ TEST_F(StackReader, NamesTheFrameOfAnotherSize) {
                                        "im.10.exr: is 4 x 5 px, but the first frame is 4 x 3 px"));
 }
 
+// Decoding 900 megapixels would take seconds and end with the words for a damaged file.
+TEST_F(StackReader, ComparesSizesBeforePixelsAreDecoded) {
+  std::string bytes("\0\0\x0A\0\0\0\0\0\0\0\0\0\x30\x75\x30\x75\x18\0", 18);  // a TGA
+  bytes.resize(1'000'000);
+  const fs::path bomb = dir_ / "im.10.tga";
+  fs::remove(dir_ / "im.10.exr");
+  testing::WriteText(bomb, bytes);
+  EXPECT_THAT(FailureOf(dir_), IsError(ErrorCode::kBadData, "im.10.tga: is 30000 x 30000 px"));
+  fs::rename(bomb, dir_ / "im.1.tga");  // it is the first now
+  EXPECT_THAT(FailureOf(dir_),
+              IsError(ErrorCode::kBadData, "im.1.tga: its header says 30000 x 30000 pixels"));
+}
+
+TEST_F(StackReader, ReadsAFirstFrameOfAsManyPixelsAsAreAllowed) {
+  ReadDatasetOptions options{.max_pixels = 11};
+  EXPECT_FALSE(ReadDataset(dir_, options));  // the frames have 12
+  options.max_pixels = 12;
+  EXPECT_TRUE(ReadDataset(dir_, options));
+}
+
 TEST_F(StackReader, NamesTheFirstFrameThatIsNoImage) {
   WriteText(dir_ / "im.11.exr", "not an image");
   WriteText(dir_ / "im.9.exr", "not an image");

@@ -117,6 +117,14 @@ TEST_F(TruthFile, RefusesAnotherSize) {
   EXPECT_THAT(FailureOf("n.exr"), IsError(ErrorCode::kBadData, "n.exr: is 4 x 4 px"));
 }
 
+TEST_F(TruthFile, RefusesAMatlabArrayOfAnotherSize) {
+  WriteMat(temp_.Path() / "n.mat", "Normal_gt", MAT_C_DOUBLE, MAT_T_DOUBLE, {kWidth, kHeight, 3},
+           TiltedNormals());
+  EXPECT_THAT(FailureOf("n.mat"),
+              IsError(ErrorCode::kBadData,
+                      "n.mat: is 3 x 4 px, but the first frame is 4 x 3 px; need one size"));
+}
+
 TEST_F(TruthFile, IsFoundByItsName) {
   EXPECT_FALSE(FindPublicTruth(temp_.Path()));
   EXPECT_FALSE(FindSessionTruth(temp_.Path()));
