@@ -1,5 +1,6 @@
-#include <functional>
 #include <set>
+#include <string>
+#include <vector>
 
 #include "core/file_io.h"
 #include "core/json.h"
@@ -11,29 +12,57 @@ using Json = nlohmann::json;
 
 constexpr int kMaxDepth = 64;  // our formats use 4; writing a deeper one could exhaust the stack
 
-// Watches the parser for what the finished value does not show: keys given twice, deep nesting.
-class ParseWatch {
+// Reads JSON for what the finished value does not show: keys given twice, deep nesting. Stops at the
+// first, before there is a value that could fill memory.
+class ParseWatch : public nlohmann::json_sax<Json> {
  public:
-  bool operator()(int depth, Json::parse_event_t event, Json& value) {
-    if (event == Json::parse_event_t::object_start) {
-      keys_.emplace_back();
-    } else if (event == Json::parse_event_t::object_end) {
-      keys_.pop_back();
-    } else if (event == Json::parse_event_t::key) {
-      const auto& key = value.get_ref<const std::string&>();
-      if (!keys_.back().insert(key).second && problem_.empty()) {
-        problem_ = fmt::format("the key \"{}\" is given twice in one object; keep one", key);
-      }
+  bool null() override { return true; }
+  bool boolean(bool /*value*/) override { return true; }
+  bool number_integer(number_integer_t /*value*/) override { return true; }
+  bool number_unsigned(number_unsigned_t /*value*/) override { return true; }
+  bool number_float(number_float_t /*value*/, const string_t& /*text*/) override { return true; }
+  bool string(string_t& /*value*/) override { return true; }
+  bool binary(binary_t& /*value*/) override { return true; }
+  bool start_object(size_t /*elements*/) override {
+    keys_.emplace_back();
+    return Descend();
+  }
+  bool key(string_t& key) override {
+    if (!keys_.back().insert(key).second) {
+      problem_ = fmt::format("the key \"{}\" is given twice in one object; keep one", key);
     }
-    if (depth > kMaxDepth && problem_.empty()) {
-      problem_ = fmt::format("nested deeper than {} levels", kMaxDepth);
-    }
+    return problem_.empty();
+  }
+  bool end_object() override {
+    keys_.pop_back();
+    --depth_;
     return true;
+  }
+  bool start_array(size_t /*elements*/) override { return Descend(); }
+  bool end_array() override {
+    --depth_;
+    return true;
+  }
+  bool parse_error(size_t /*position*/, const std::string& /*token*/,
+                   const nlohmann::detail::exception& error) override {
+    const std::string what = error.what();
+    const size_t end_of_id = what.find("] ");  // "[json.exception.parse_error.101] "
+    problem_ =
+        "not valid JSON: " + (end_of_id == std::string::npos ? what : what.substr(end_of_id + 2));
+    return false;
   }
   [[nodiscard]] const std::string& Problem() const { return problem_; }
 
  private:
+  bool Descend() {
+    if (++depth_ > kMaxDepth) {
+      problem_ = fmt::format("nested deeper than {} levels", kMaxDepth);
+    }
+    return problem_.empty();
+  }
+
   std::vector<std::set<std::string>> keys_;  // keys of each open object
+  int depth_ = 0;
   std::string problem_;
 };
 
@@ -41,18 +70,10 @@ class ParseWatch {
 
 Result<Json> ParseJson(const std::string& text, const std::string& where) {
   ParseWatch watch;
-  try {
-    Json value = Json::parse(text, std::ref(watch));
-    if (!watch.Problem().empty()) {
-      return Fail(ErrorCode::kBadData, "{}: {}", where, watch.Problem());
-    }
-    return value;
-  } catch (const Json::exception& e) {
-    const std::string what = e.what();
-    const size_t end_of_id = what.find("] ");  // "[json.exception.parse_error.101] "
-    return Fail(ErrorCode::kBadData, "{}: not valid JSON: {}", where,
-                end_of_id == std::string::npos ? what : what.substr(end_of_id + 2));
+  if (!Json::sax_parse(text, &watch)) {
+    return Fail(ErrorCode::kBadData, "{}: {}", where, watch.Problem());
   }
+  return Json::parse(text);
 }
 
 Status TakeSchema(Json& file, const std::string& where, std::string_view name, int major) {

@@ -8,6 +8,7 @@
 #include <exception>
 #include <memory>
 #include <new>
+#include <regex>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -55,6 +56,8 @@ const char* FormatOf(const std::filesystem::path& path, const std::string& head)
 }
 
 tl::unexpected<Error> Undecodable(const std::filesystem::path& path, std::string reason) {
+  static const std::regex library_name("/proc/self/fd/[0-9]+");  // InputFile::LibraryName()
+  reason = std::regex_replace(reason, library_name, "it");
   while (!reason.empty() && std::isspace(static_cast<unsigned char>(reason.back())) != 0) {
     reason.pop_back();
   }

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Gives `sateen solve` small files that unfold into large ones, or into endless work.
 
-    bombs.py PROGRAM [NAME]
+    bombs.py PROGRAM [NAME] [--verbose]
 
 Each must be refused (exit status 2 to 5, with words) within 1 s and 300 MB; the address space has
 2 GB. The processor's seconds count, so that a busy machine fails no one.
@@ -61,7 +61,7 @@ def jpeg(width, height, progressive):
     return (b'\xff\xd8\xff\xe0\0\x10JFIF\0\1\1\0\0\1\0\1\0\0\xff\xdb\0C\0' + b'\1' * 64 +
             (b'\xff\xc2' if progressive else b'\xff\xc0') +
             struct.pack('>HBHHB', 17, 8, height, width, 3) + b'\1\x22\0\2\x11\0\3\x11\0' +
-            b'\xff\xc4\0\x15\0\1' + bytes(15) + b'\0\0\xff\xda\0\x0c\3\1\0\2\0\3\0\0\x3f\0' +
+            b'\xff\xc4\0\x14\0\1' + bytes(16) + b'\xff\xc4\0\x14\x10\1' + bytes(16) + b'\xff\xda\0\x0c\3\1\0\2\0\3\0\0\x3f\0' +
             bytes(100000) + b'\xff\xd9')
 
 
@@ -161,10 +161,10 @@ def pictures():
 def texts():
     """Bombs in place of records and tables: how they are given, name and bytes."""
     yield 'rig', 'deep.json', b'[' * 5_000_000
-    yield 'rig', 'wide.json', b'[' + b'{},' * 2_700_000 + b'{}]'
-    yield 'rig', 'keys.json', b'{' + b','.join(b'"%d":0' % i for i in range(600_000)) + b'}'
+    yield 'rig', 'wide.json', b'[' + b'{},' * 1_390_000 + b'{}]'
+    yield 'rig', 'keys.json', b'{' + b','.join(b'"%d":0' % i for i in range(370_000)) + b'}'
     yield 'rig', 'long.json', b'{"schema":"' + b'a' * 50_000_000 + b'"}'
-    yield 'capture', 'many.lp', b'300000\n' + b'a.png 0 0 1\n' * 300_000
+    yield 'capture', 'many.lp', b'340000\n' + b'a.png 0 0 1\n' * 340_000
     yield 'capture', 'says-many.lp', b'1000000000\na.png 0 0 1\n'
     yield 'mask', 'mask.png', png(20000, 20000, 8, 0, zeros(20001 * 20000))
     yield 'truth', 'Normal_gt.mat', mat(20000, 20000, 400 << 20)
@@ -184,7 +184,7 @@ def write_folder(folder):
         b'\0' + bytes(100 + (x + y) % 50 for x in range(64)) for y in range(48))))
     for i in range(5):
         (folder / f'{i}.png').write_bytes(picture)
-    (folder / 'lights.txt').write_text('0 0 1\n0.5 0 0.8\n-0.5 0 0.8\n0 0.5 0.8\n0 -0.5 0.8\n')
+    (folder / 'lights.txt').write_text('0 0 1\n0.6 0 0.8\n-0.6 0 0.8\n0 0.6 0.8\n0 -0.6 0.8\n')
 
 
 def command(program, folder, out, use, path):
@@ -233,7 +233,9 @@ def cases(work):
 
 def main():
     program = pathlib.Path(sys.argv[1]).resolve()
-    only = sys.argv[2] if len(sys.argv) > 2 else ''
+    words = [word for word in sys.argv[2:] if word != "--verbose"]
+    only = words[0] if words else ""
+    verbose = "--verbose" in sys.argv
     tally = runner.Tally()
     with tempfile.TemporaryDirectory() as temp:
         work = pathlib.Path(temp)
@@ -255,6 +257,8 @@ def main():
             elif 'error: ' not in outcome.err:
                 fault = 'was refused without words'
             tally.add(name, outcome, fault)
+            if verbose:
+                print(f"{name}: {outcome.err.strip()}")
     tally.end()
 
 
