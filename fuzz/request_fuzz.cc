@@ -33,8 +33,10 @@ std::string AnswerTo(Daemon& daemon, std::string_view request) {
   Need(shutdown(ends[0], SHUT_WR) == 0);
   {
     Connection connection(ends[1], {});
-    HttpExchange(connection, {daemon.api, daemon.service, daemon.access, daemon.options,
-                              daemon.streams, daemon.stopping})
+    HttpExchange(connection,
+                 {daemon.api, daemon.service, daemon.access, daemon.options, daemon.streams,
+                  daemon.stopping},
+                 "")
         .Run();
   }
   close(ends[1]);

@@ -22,12 +22,11 @@ CLOCK_SECONDS = 20.0  # the end of a run that waits
 
 
 def zeros(count):
-    """Returns `count` zeros, deflated in pieces."""
+    """Returns at least `count` zeros, deflated: one piece, many times."""
     pack = zlib.compressobj(9)
-    piece = bytes(1 << 20)
-    packed = [pack.compress(piece) for _ in range(count >> 20)]
-    packed += [pack.compress(bytes(count & ((1 << 20) - 1))), pack.flush()]
-    return b''.join(packed)
+    head = pack.compress(b'') + pack.flush(zlib.Z_FULL_FLUSH)
+    piece = pack.compress(bytes(1 << 20)) + pack.flush(zlib.Z_FULL_FLUSH)
+    return head + piece * (count // (1 << 20) + 1) + pack.flush()
 
 
 def chunk(kind, data):

@@ -32,6 +32,7 @@ SCENE = '''{"schema": "sateen.scene/1", "rig": "rig.json",
 "surface": {"shape": "plane"}, "materials": {"surface": {"albedo": [0.5, 0.5, 0.5]}}}'''
 RIG = '''{"schema": "sateen.rig/1",
 "camera": {"model": "simulated", "size_px": [64, 48], "k": [80, 80, 31.5, 23.5],
+  "distortion": [0, 0, 0, 0, 0],
   "table_from_camera": [1, 0, 0, 0, 0, -1, 0, 0, 0, 0, -1, 400, 0, 0, 0, 1]},
 "lights": [%s]}''' % ', '.join(
     '{"name": "led-%d", "channel": %d, "model": "near", "position_mm": [%d, %d, 400], '
@@ -172,7 +173,8 @@ def try_command(program, words, line, kinds, tally):
                 continue
             outcome = runner.run(full, CLOCK_SECONDS)
             fault = fault_of(outcome, option)
-            if not fault and outcome.busy_seconds > SECONDS:
+            measures = words[0] == 'bench'  # before it writes
+            if not fault and outcome.busy_seconds > SECONDS and not measures:
                 fault = f'takes more than {SECONDS:g} s of processor time'
             tally.add(name, outcome, fault)
 
