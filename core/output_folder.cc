@@ -171,7 +171,11 @@ Status WriteFileWhole(const fs::path& path, const std::string& text) {
   const fs::path target =
       fs::is_symlink(path, ignored) ? fs::weakly_canonical(path, ignored) : path;
   const fs::file_status old = fs::status(target, ignored);
-  if (target.empty() || fs::is_directory(old)) {
+  if (target.empty()) {
+    return Fail(ErrorCode::kIo, "{}: its links lead nowhere; give the name of a file",
+                path.string());
+  }
+  if (fs::is_directory(old)) {
     return Fail(ErrorCode::kIo, "{}: is a folder; give the name of a file", path.string());
   }
   if (fs::exists(old) && !fs::is_regular_file(old)) {

@@ -101,6 +101,10 @@ Result<ReadPlan> PlanDiligent(const fs::path& dir) {
     }
     plan.lit.emplace_back(1, FrameFile{dir / tables->names[k].text, 1.0, std::nullopt});
   }
+  const std::string intensities = (dir / "light_intensities.txt").string();
+  if (const Status fit = plan.rig.Validate(intensities); !fit) {
+    return tl::unexpected(fit.error());
+  }
   return plan;
 }
 

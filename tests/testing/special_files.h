@@ -2,6 +2,7 @@
 
 #include <sys/socket.h>
 #include <sys/stat.h>
+#include <sys/sysmacros.h>
 #include <sys/un.h>
 #include <unistd.h>
 
@@ -28,7 +29,10 @@ inline std::vector<SpecialFile> MakeSpecialFiles(const std::filesystem::path& fo
     return files.emplace_back(SpecialFile{folder / name, reason}).path;
   };
   mkfifo(add("pipe", "is a pipe; need a file").c_str(), 0600);
-  fs::create_symlink("/dev/zero", add("endless-device", "is a device; need a file"));
+  const fs::path device = add("endless-device", "is a device; need a file");
+  if (mknod(device.c_str(), S_IFCHR | 0600, makedev(1, 5)) != 0) {  // for root alone
+    fs::create_symlink("/dev/zero", device);
+  }
   fs::create_symlink("/dev/tty", add("terminal", "is a device; need a file"));
   fs::create_directory(add("folder", "is a folder; need a file"));
   fs::create_symlink("loop", add("loop", "its links lead in a circle"));

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include "rig/rig.h"
+
 namespace sateen {
 namespace {
 
@@ -90,6 +92,13 @@ Result<Lights> LightsFromRows(const std::vector<NumberRow>& rows, LengthRange le
       return tl::unexpected(light.error());
     }
     lights.push_back(*std::move(light));
+  }
+  if (!rows.empty()) {
+    const std::string& place = rows.front().place;  // "lights.lp:2"
+    const Rig rig{.lights = lights};
+    if (const Status fit = rig.Validate(place.substr(0, place.rfind(':'))); !fit) {
+      return tl::unexpected(fit.error());
+    }
   }
   return lights;
 }
