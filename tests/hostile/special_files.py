@@ -152,11 +152,13 @@ def serve_ends(words):
         return 'SIGTERM does not end the daemon'
 
 
-def fault_of(outcome, option):
+def fault_of(outcome, option, kind):
     if outcome.status is None:
         return 'does not end'
     if outcome.status in runner.REFUSED:
         return '' if outcome.err.strip() else 'is refused without words'
+    if outcome.status == runner.DONE and kind == 'folder':  # some take one
+        return ''
     # A name that is replaced (an output), or that is not a path.
     if outcome.status == runner.DONE and option in FREE | {'--output', '--plot', '--markdown'}:
         return ''
@@ -176,7 +178,7 @@ def try_command(program, words, line, kinds, tally):
                 tally.add(name, runner.Outcome(0, 0.0, 0.0, 0, ''), serve_ends(full))
                 continue
             outcome = runner.run(full, CLOCK_SECONDS)
-            fault = fault_of(outcome, option)
+            fault = fault_of(outcome, option, kind)
             measures = words[0] == 'bench'  # before it writes
             if not fault and outcome.busy_seconds > SECONDS and not measures:
                 fault = f'takes more than {SECONDS:g} s of processor time'
