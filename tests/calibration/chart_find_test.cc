@@ -115,6 +115,10 @@ TEST(Chart, NamesWhatIsOutOfRange) {
               HasSubstr("'p0' and 'p0' have one name"));
   EXPECT_THAT(message([](Chart& chart) { chart.patches[1].center_mm.x() = -10.0; }),
               HasSubstr("'p0' and 'p1' overlap"));
+  EXPECT_THAT(message([](Chart& chart) { chart.patches[1].center_mm.y() = 1e30; }),
+              HasSubstr("patches[1]: center_mm is"));
+  EXPECT_THAT(message([](Chart& chart) { chart.patches.resize(2001); }),
+              HasSubstr("patches has 2001; need at most 2000"));
 }
 
 }  // namespace

@@ -230,6 +230,18 @@ def cases(work):
         yield name, use, work / name
 
 
+def try_without_room(program, work, tally):
+    """Five frames of 20 megapixels, which are right, in 500 MB of address space."""
+    folder = work / 'large'
+    write_folder(folder)
+    frame = png(5000, 4000, 8, 0, zlib.compress(bytes(5001 * 4000)))
+    for i in range(5):
+        (folder / f'{i}.png').write_bytes(frame)
+    outcome = runner.run([program, 'solve', folder, '-o', work / 'out'], CLOCK_SECONDS, 500 << 20)
+    said = outcome.status == 1 and 'out of memory' in outcome.err and 'damaged' not in outcome.err
+    tally.add('no room for large frames', outcome, '' if said else 'is not called out of memory')
+
+
 def main():
     program = pathlib.Path(sys.argv[1]).resolve()
     words = [word for word in sys.argv[2:] if word != "--verbose"]
@@ -258,6 +270,7 @@ def main():
             tally.add(name, outcome, fault)
             if verbose:
                 print(f"{name}: {outcome.err.strip()}")
+        try_without_room(program, work, tally)
     tally.end()
 
 

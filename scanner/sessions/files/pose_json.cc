@@ -1,6 +1,9 @@
 #include "scanner/sessions/files/pose_json.h"
 
+#include <fmt/format.h>
+
 #include "core/json.h"
+#include "rig/plausible.h"
 
 namespace sateen {
 namespace {
@@ -25,6 +28,10 @@ std::optional<Eigen::Isometry3d> ReadTransform(JsonReader& json, std::string_vie
       rotation.determinant() > 0.0 && matrix.row(3) == Eigen::RowVector4d(0, 0, 0, 1);
   json.Require(is_rigid, key,
                "is not a rigid motion; need a rotation, a translation and 0 0 0 1, by rows");
+  const double farthest_mm = matrix.topRightCorner<3, 1>().cwiseAbs().maxCoeff();
+  json.Require(
+      farthest_mm <= kPlausiblePlace.most, key,
+      fmt::format("moves by {:g} mm; need {:g} at most", farthest_mm, kPlausiblePlace.most));
   return Eigen::Isometry3d(matrix);
 }
 

@@ -119,6 +119,7 @@ TEST(Session, RefusesEachKeyThatIsWrong) {
   expect([](Json& j) { j["schema"] = "sateen.session/2"; }, "sateen.session/2");
   expect([](Json& j) { j["table_from_sheet"][0] = 2; }, "table_from_sheet is not a rigid motion");
   expect([](Json& j) { j["table_from_sheet"][15] = 2; }, "table_from_sheet is not a rigid motion");
+  expect([](Json& j) { j["table_from_sheet"][3] = 1e30; }, "table_from_sheet moves by 1e+30 mm");
   expect([](Json& j) { j["table_from_sheet"] = {-1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}; },
          "table_from_sheet is not a rigid motion");  // a mirror
 }
