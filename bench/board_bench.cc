@@ -18,14 +18,14 @@
 #include <utility>
 #include <vector>
 
-#include "core/file_io.h"
+#include "core/files/file_io.h"
 #include "core/interrupt.h"
 #include "core/progress_bar.h"
 #include "scanner/devices/light_board.h"
 #include "scanner/devices/serial_port.h"
-#include "simulation/virtual_rig/line_stress.h"
-#include "simulation/virtual_rig/simulated_port.h"
-#include "simulation/virtual_rig/virtual_board.h"
+#include "simulation/virtual_rig/board/line_stress.h"
+#include "simulation/virtual_rig/board/simulated_port.h"
+#include "simulation/virtual_rig/board/virtual_board.h"
 
 namespace {
 

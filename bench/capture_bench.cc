@@ -16,8 +16,8 @@
 #include <string>
 #include <vector>
 
-#include "core/file_io.h"
-#include "core/own_folder.h"
+#include "core/files/file_io.h"
+#include "core/files/own_folder.h"
 #include "scanner/capture/capture_request.h"
 
 namespace {

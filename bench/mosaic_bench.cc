@@ -17,9 +17,9 @@
 #include <string>
 #include <vector>
 
-#include "core/file_io.h"
-#include "core/output_folder.h"
-#include "core/own_folder.h"
+#include "core/files/file_io.h"
+#include "core/files/output_folder.h"
+#include "core/files/own_folder.h"
 #include "core/parallel.h"
 #include "core/sha256.h"
 #include "imaging/dng.h"

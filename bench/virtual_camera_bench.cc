@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "imaging/dng.h"
-#include "simulation/virtual_rig/scene_frame.h"
+#include "simulation/virtual_rig/camera/scene_frame.h"
 
 namespace {
 

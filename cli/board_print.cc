@@ -4,8 +4,8 @@
 #include <nlohmann/json.hpp>
 #include <ostream>
 
+#include "core/files/output_folder.h"
 #include "core/json.h"
-#include "core/output_folder.h"
 #include "core/version.h"
 #include "targets/page.h"
 

@@ -7,7 +7,7 @@
 #include "cli/command.h"
 #include "core/task.h"
 #include "scanner/capture/capture_request.h"
-#include "scanner/daemon/http_client.h"
+#include "scanner/daemon/http/http_client.h"
 
 namespace sateen::cli {
 

@@ -3,7 +3,7 @@
 #include <optional>
 
 #include "cli/command.h"
-#include "scanner/daemon/http_client.h"
+#include "scanner/daemon/http/http_client.h"
 #include "scanner/devices/rig_devices.h"
 
 namespace sateen::cli {

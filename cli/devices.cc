@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "scanner/daemon/device_list.h"
-#include "scanner/daemon/http_client.h"
+#include "scanner/daemon/http/http_client.h"
 #include "scanner/devices/light_board.h"
 
 namespace sateen::cli {

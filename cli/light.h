@@ -8,7 +8,7 @@
 
 #include "cli/command.h"
 #include "core/task.h"
-#include "scanner/daemon/http_client.h"
+#include "scanner/daemon/http/http_client.h"
 #include "scanner/devices/byte_port.h"
 
 namespace sateen::cli {

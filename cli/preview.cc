@@ -4,7 +4,7 @@
 #include <ostream>
 
 #include "cli/device_options.h"
-#include "core/output_folder.h"
+#include "core/files/output_folder.h"
 #include "core/quantity.h"
 
 namespace sateen::cli {

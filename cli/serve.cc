@@ -9,10 +9,10 @@
 #include <vector>
 
 #include "core/version.h"
-#include "scanner/daemon/access.h"
 #include "scanner/daemon/api.h"
-#include "scanner/daemon/http_server.h"
-#include "scanner/daemon/listener.h"
+#include "scanner/daemon/http/access.h"
+#include "scanner/daemon/http/http_server.h"
+#include "scanner/daemon/http/listener.h"
 #include "scanner/daemon/rig_service.h"
 
 namespace sateen::cli {

@@ -2,7 +2,7 @@
 #include <string>
 #include <vector>
 
-#include "core/file_io.h"
+#include "core/files/file_io.h"
 #include "core/json.h"
 
 namespace sateen {

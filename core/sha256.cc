@@ -7,7 +7,7 @@
 #include <memory>
 
 #include "core/check.h"
-#include "core/file_io.h"
+#include "core/files/file_io.h"
 
 namespace sateen {
 namespace {

@@ -7,7 +7,7 @@
 #include <array>
 
 #include "fuzz/target.h"
-#include "scanner/daemon/http_exchange.h"
+#include "scanner/daemon/http/http_exchange.h"
 
 namespace sateen::fuzz {
 namespace {

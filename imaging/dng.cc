@@ -13,8 +13,8 @@
 #include <utility>
 
 #include "core/check.h"
+#include "core/files/output_folder.h"
 #include "core/option_range.h"
-#include "core/output_folder.h"
 
 namespace sateen {
 namespace {

@@ -4,7 +4,7 @@
 #include <string>
 
 #include "core/error.h"
-#include "core/input_file.h"
+#include "core/files/input_file.h"
 
 namespace sateen {
 

@@ -14,7 +14,7 @@
 #include <utility>
 #include <vector>
 
-#include "core/input_file.h"
+#include "core/files/input_file.h"
 #include "imaging/color.h"
 #include "imaging/file_check.h"
 

@@ -55,7 +55,7 @@ struct Photo {
 [[nodiscard]] bool IsPhotoName(const std::filesystem::path& path);
 
 // Writers give the same bytes for the same image. kIo where the file cannot be written whole; what
-// is there then counts for nothing (the caller writes through core/output_folder.h).
+// is there then counts for nothing (the caller writes through core/files/output_folder.h).
 // EXR: 32-bit float, not compressed (imaging/band_writer.h); channels R, G, B or Y.
 [[nodiscard]] Status WriteExr(const std::filesystem::path& path, const Image3& image);
 [[nodiscard]] Status WriteExr(const std::filesystem::path& path, const Image<float>& image);

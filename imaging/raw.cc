@@ -12,7 +12,7 @@
 #include <utility>
 
 #include "core/check.h"
-#include "core/input_file.h"
+#include "core/files/input_file.h"
 #include "imaging/file_check.h"
 
 namespace sateen {

@@ -42,7 +42,7 @@ struct Rig {
 [[nodiscard]] Eigen::Vector3d WhiteBalanceOf(const Rig& rig);
 
 // Returns the lights as a rig of another white balance has them. Fluxes are in balanced units, as
-// the frames are (scanner/sessions/sensor_reading.h), so that albedo stays the same.
+// the frames are (scanner/sessions/frames/sensor_reading.h), so that albedo stays the same.
 [[nodiscard]] Lights Rebalanced(Lights lights, const Eigen::Vector3d& from,
                                 const Eigen::Vector3d& to);
 

@@ -8,9 +8,9 @@
 #include <utility>
 
 #include "cli/bench/peak_memory.h"
+#include "core/files/output_folder.h"
+#include "core/files/own_folder.h"
 #include "core/json.h"
-#include "core/output_folder.h"
-#include "core/own_folder.h"
 #include "core/parallel.h"
 #include "imaging/raw.h"
 #include "pipelines/calibrate/calibrate_lights.h"

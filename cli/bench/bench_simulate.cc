@@ -11,7 +11,7 @@
 #include "cli/bench/bench_simulate_report.h"
 #include "cli/bench/peak_memory.h"
 #include "cli/bench/scene_switches.h"
-#include "core/own_folder.h"
+#include "core/files/own_folder.h"
 #include "imaging/dng.h"
 #include "imaging/image_io.h"
 #include "imaging/raw.h"

@@ -10,7 +10,7 @@
 #include "cli/bench/bench_report.h"
 #include "cli/bench/best_seconds.h"
 #include "core/angle.h"
-#include "core/output_folder.h"
+#include "core/files/output_folder.h"
 #include "simulation/relief.h"
 #include "simulation/rigs.h"
 #include "solver/kernels/fast_kernel.h"

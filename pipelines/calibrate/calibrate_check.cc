@@ -4,13 +4,13 @@
 #include <limits>
 #include <utility>
 
-#include "core/output_folder.h"
+#include "core/files/output_folder.h"
 #include "core/statistics.h"
 #include "core/stopwatch.h"
 #include "imaging/image_io.h"
-#include "pipelines/calibrate/check_pictures.h"
 #include "pipelines/calibrate/check_report.h"
 #include "pipelines/calibrate/check_words.h"
+#include "pipelines/calibrate/pictures/check_pictures.h"
 #include "scanner/sessions/sheet_reader.h"
 
 namespace sateen {

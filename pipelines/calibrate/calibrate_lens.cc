@@ -6,7 +6,7 @@
 
 #include "core/angle.h"
 #include "core/stopwatch.h"
-#include "pipelines/calibrate/lens_pictures.h"
+#include "pipelines/calibrate/pictures/lens_pictures.h"
 #include "pipelines/calibrate/rig_record.h"
 
 namespace sateen {

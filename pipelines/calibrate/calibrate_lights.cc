@@ -7,7 +7,7 @@
 #include "core/angle.h"
 #include "core/parallel.h"
 #include "core/stopwatch.h"
-#include "pipelines/calibrate/lights_pictures.h"
+#include "pipelines/calibrate/pictures/lights_pictures.h"
 #include "pipelines/calibrate/rig_record.h"
 #include "scanner/sessions/files/pose_json.h"
 #include "scanner/sessions/sheet_reader.h"

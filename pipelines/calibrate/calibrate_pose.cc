@@ -6,7 +6,7 @@
 
 #include "core/angle.h"
 #include "core/stopwatch.h"
-#include "pipelines/calibrate/pose_pictures.h"
+#include "pipelines/calibrate/pictures/pose_pictures.h"
 #include "pipelines/calibrate/rig_record.h"
 #include "rig/projection.h"
 #include "scanner/sessions/files/pose_json.h"

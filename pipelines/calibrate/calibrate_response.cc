@@ -6,7 +6,7 @@
 
 #include "core/sha256.h"
 #include "core/stopwatch.h"
-#include "pipelines/calibrate/response_pictures.h"
+#include "pipelines/calibrate/pictures/response_pictures.h"
 #include "pipelines/calibrate/response_record.h"
 #include "pipelines/calibrate/rig_record.h"
 #include "scanner/sessions/files/chart_file.h"

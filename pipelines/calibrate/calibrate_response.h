@@ -36,7 +36,7 @@ struct ResponseCalibration : RigCalibration {
 };
 
 /// Gives a rig the response that was measured. Fluxes are in balanced units
-/// (scanner/sessions/sensor_reading.h), so a new balance changes them too, or albedos would change
+/// (scanner/sessions/frames/sensor_reading.h), so a new balance changes them too, or albedos would change
 /// colour:
 ///
 ///     phi_kc' = phi_kc w_c / w_c(before)     measured by white paper, or without a frame here (1)

@@ -6,8 +6,8 @@
 #include <tuple>
 #include <vector>
 
+#include "core/files/output_folder.h"
 #include "core/json.h"
-#include "core/output_folder.h"
 #include "core/quantity.h"
 #include "core/sha256.h"
 #include "imaging/image_io.h"

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "core/error.h"
-#include "core/output_folder.h"
+#include "core/files/output_folder.h"
 #include "imaging/band_writer.h"
 #include "imaging/light_stack.h"
 #include "imaging/show/thumbnail.h"

@@ -2,7 +2,7 @@
 
 #include <optional>
 
-#include "core/output_folder.h"
+#include "core/files/output_folder.h"
 #include "core/task.h"
 #include "imaging/mosaic_stack.h"
 #include "pipelines/solve/maps.h"

@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include "core/output_folder.h"
+#include "core/files/output_folder.h"
 #include "core/stopwatch.h"
 #include "pipelines/solve/mosaic_maps.h"
 #include "pipelines/solve/solve_checks.h"

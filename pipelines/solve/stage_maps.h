@@ -1,7 +1,7 @@
 #pragma once
 
 #include "core/error.h"
-#include "core/output_folder.h"
+#include "core/files/output_folder.h"
 #include "core/task.h"
 #include "pipelines/solve/solve.h"
 

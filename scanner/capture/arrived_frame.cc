@@ -2,8 +2,8 @@
 
 #include <utility>
 
-#include "core/file_io.h"
-#include "core/output_folder.h"
+#include "core/files/file_io.h"
+#include "core/files/output_folder.h"
 
 namespace sateen {
 

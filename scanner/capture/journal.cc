@@ -11,7 +11,7 @@
 #include <utility>
 
 #include "core/check.h"
-#include "core/file_io.h"
+#include "core/files/file_io.h"
 #include "core/json.h"
 #include "scanner/sessions/session_json.h"
 

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <utility>
 
-#include "core/own_folder.h"
+#include "core/files/own_folder.h"
 #include "imaging/color.h"
 #include "imaging/image_io.h"
 #include "imaging/raw.h"
@@ -14,7 +14,7 @@
 #include "scanner/capture/exposure_search.h"
 #include "scanner/capture/frame_taker.h"
 #include "scanner/sessions/files/folder_listing.h"
-#include "scanner/sessions/sensor_reading.h"
+#include "scanner/sessions/frames/sensor_reading.h"
 
 namespace sateen {
 namespace {

@@ -10,7 +10,7 @@
 #include "scanner/capture/session_folder.h"
 #include "scanner/capture/session_store.h"
 #include "scanner/sessions/files/folder_listing.h"
-#include "scanner/sessions/frame_loader.h"
+#include "scanner/sessions/frames/frame_loader.h"
 
 namespace sateen {
 namespace {

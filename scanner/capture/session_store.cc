@@ -5,14 +5,14 @@
 #include <utility>
 
 #include "core/check.h"
-#include "core/file_exchange.h"
-#include "core/file_io.h"
-#include "core/output_folder.h"
+#include "core/files/file_exchange.h"
+#include "core/files/file_io.h"
+#include "core/files/output_folder.h"
 #include "core/sha256.h"
 #include "scanner/capture/own_frames.h"
 #include "scanner/capture/session_folder.h"
 #include "scanner/sessions/files/folder_listing.h"
-#include "scanner/sessions/frame_loader.h"
+#include "scanner/sessions/frames/frame_loader.h"
 
 namespace sateen {
 namespace {

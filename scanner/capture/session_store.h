@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "core/error.h"
-#include "core/own_folder.h"
+#include "core/files/own_folder.h"
 #include "rig/rig.h"
 #include "scanner/capture/capture_options.h"
 #include "scanner/capture/frame_plan.h"

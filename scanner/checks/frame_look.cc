@@ -8,8 +8,8 @@
 
 #include "imaging/image_io.h"
 #include "imaging/raw.h"
-#include "scanner/sessions/frame_loader.h"
-#include "scanner/sessions/sensor_reading.h"
+#include "scanner/sessions/frames/frame_loader.h"
+#include "scanner/sessions/frames/sensor_reading.h"
 
 namespace sateen {
 namespace {

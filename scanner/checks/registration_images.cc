@@ -5,7 +5,7 @@
 #include <limits>
 #include <vector>
 
-#include "scanner/sessions/frame_shift.h"
+#include "scanner/sessions/frames/frame_shift.h"
 
 namespace sateen {
 

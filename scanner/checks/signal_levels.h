@@ -4,8 +4,8 @@
 #include "imaging/image_io.h"
 #include "imaging/raw.h"
 #include "rig/rig.h"
+#include "scanner/sessions/frames/sensor_reading.h"
 #include "scanner/sessions/read_plan.h"
-#include "scanner/sessions/sensor_reading.h"
 
 namespace sateen {
 

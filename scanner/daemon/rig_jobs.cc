@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "core/output_folder.h"
+#include "core/files/output_folder.h"
 #include "scanner/daemon/answer_json.h"
 #include "scanner/daemon/device_list.h"
 

@@ -5,7 +5,7 @@
 #include <cerrno>
 #include <cmath>
 
-#include "core/file_io.h"
+#include "core/files/file_io.h"
 #include "imaging/raw.h"
 
 namespace sateen {

@@ -6,7 +6,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
-#include "core/file_io.h"
+#include "core/files/file_io.h"
 
 namespace sateen {
 namespace {

@@ -13,7 +13,7 @@
 #include <string>
 #include <utility>
 
-#include "core/file_io.h"
+#include "core/files/file_io.h"
 #include "scanner/devices/worker_message.h"
 
 namespace sateen {

@@ -8,8 +8,8 @@
 #include "core/error.h"
 #include "imaging/image_io.h"
 #include "imaging/raw.h"
+#include "scanner/sessions/frames/sensor_reading.h"
 #include "scanner/sessions/read_plan.h"
-#include "scanner/sessions/sensor_reading.h"
 
 namespace sateen {
 

@@ -12,7 +12,7 @@
 #include "imaging/image_io.h"
 #include "imaging/raw.h"
 #include "scanner/sessions/files/folder_listing.h"
-#include "scanner/sessions/frame_loader.h"
+#include "scanner/sessions/frames/frame_loader.h"
 #include "scanner/sessions/session.h"
 
 namespace sateen {

@@ -9,7 +9,7 @@
 #include "imaging/raw.h"
 #include "scanner/sessions/dataset.h"
 #include "scanner/sessions/files/patch_places.h"
-#include "scanner/sessions/frame_loader.h"
+#include "scanner/sessions/frames/frame_loader.h"
 #include "scanner/sessions/session_layout.h"
 
 namespace sateen {

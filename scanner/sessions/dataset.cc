@@ -8,7 +8,7 @@
 #include "core/sha256.h"
 #include "imaging/raw.h"
 #include "scanner/sessions/files/folder_listing.h"
-#include "scanner/sessions/frame_loader.h"
+#include "scanner/sessions/frames/frame_loader.h"
 #include "scanner/sessions/lp_layout.h"
 #include "scanner/sessions/public_layouts.h"
 #include "scanner/sessions/read_plan.h"

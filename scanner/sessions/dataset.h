@@ -11,7 +11,7 @@
 #include "imaging/image_io.h"
 #include "imaging/light_stack.h"
 #include "rig/rig.h"
-#include "scanner/sessions/mosaic_loader.h"
+#include "scanner/sessions/frames/mosaic_loader.h"
 #include "scanner/sessions/session.h"
 #include "scanner/sessions/truth.h"
 

@@ -8,7 +8,7 @@
 #include <memory>
 #include <string_view>
 
-#include "core/input_file.h"
+#include "core/files/input_file.h"
 #include "core/sha256.h"
 #include "imaging/image_io.h"
 #include "scanner/sessions/files/folder_listing.h"

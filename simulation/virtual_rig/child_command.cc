@@ -7,7 +7,7 @@
 #include <array>
 #include <cerrno>
 
-#include "core/file_io.h"
+#include "core/files/file_io.h"
 
 namespace sateen {
 

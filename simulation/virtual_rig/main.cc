@@ -15,13 +15,13 @@
 #include <utility>
 #include <vector>
 
-#include "core/file_io.h"
+#include "core/files/file_io.h"
 #include "core/interrupt.h"
 #include "rig/rig.h"
+#include "simulation/virtual_rig/board/light_log.h"
+#include "simulation/virtual_rig/camera/rig_camera.h"
 #include "simulation/virtual_rig/child_command.h"
-#include "simulation/virtual_rig/light_log.h"
 #include "simulation/virtual_rig/rig_args.h"
-#include "simulation/virtual_rig/rig_camera.h"
 #include "simulation/virtual_rig/rig_commands.h"
 #include "simulation/virtual_rig/rig_loop.h"
 

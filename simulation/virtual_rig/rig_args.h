@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "simulation/virtual_rig/rig_camera.h"
+#include "simulation/virtual_rig/camera/rig_camera.h"
 
 namespace sateen {
 

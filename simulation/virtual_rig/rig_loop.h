@@ -9,9 +9,9 @@
 #include <vector>
 
 #include "core/error.h"
-#include "simulation/virtual_rig/light_log.h"
+#include "simulation/virtual_rig/board/light_log.h"
+#include "simulation/virtual_rig/board/virtual_board.h"
 #include "simulation/virtual_rig/rig_action.h"
-#include "simulation/virtual_rig/virtual_board.h"
 #include "simulation/virtual_rig/virtual_port.h"
 
 namespace sateen {

@@ -6,9 +6,9 @@
 #include <string_view>
 
 #include "core/error.h"
+#include "simulation/virtual_rig/camera/scene_camera.h"
+#include "simulation/virtual_rig/camera/virtual_camera.h"
 #include "simulation/virtual_rig/rig_action.h"
-#include "simulation/virtual_rig/scene_camera.h"
-#include "simulation/virtual_rig/virtual_camera.h"
 
 namespace sateen {
 

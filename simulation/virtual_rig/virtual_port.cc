@@ -12,8 +12,8 @@
 #include <cstdlib>
 #include <utility>
 
-#include "core/file_io.h"
-#include "simulation/virtual_rig/line_speed.h"
+#include "core/files/file_io.h"
+#include "simulation/virtual_rig/board/line_speed.h"
 
 namespace sateen {
 namespace fs = std::filesystem;

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "core/error.h"
-#include "core/own_folder.h"
+#include "core/files/own_folder.h"
 
 namespace sateen {
 

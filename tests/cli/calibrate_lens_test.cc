@@ -7,7 +7,7 @@
 #include <filesystem>
 
 #include "cli/calibrate/calibrate_pose.h"
-#include "core/file_io.h"
+#include "core/files/file_io.h"
 #include "imaging/image_io.h"
 #include "rig/rig.h"
 #include "tests/cli/cli_runner.h"

@@ -10,7 +10,7 @@
 
 #include "cli/devices.h"
 #include "cli/light.h"
-#include "scanner/daemon/http_client.h"
+#include "scanner/daemon/http/http_client.h"
 #include "tests/cli/cli_runner.h"
 #include "tests/scanner/daemon/daemon_fakes.h"
 #include "tests/scanner/daemon/hostile_clients.h"

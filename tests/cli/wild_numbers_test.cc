@@ -4,7 +4,7 @@
 #include <cstdlib>
 #include <nlohmann/json.hpp>
 
-#include "core/file_io.h"
+#include "core/files/file_io.h"
 #include "imaging/image_io.h"
 #include "tests/cli/cli_runner.h"
 #include "tests/testing/files.h"

@@ -1,9 +1,9 @@
-#include "core/input_file.h"
+#include "core/files/input_file.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "core/file_io.h"
+#include "core/files/file_io.h"
 #include "core/json.h"
 #include "core/sha256.h"
 #include "tests/testing/files.h"

@@ -1,4 +1,4 @@
-#include "core/output_folder.h"
+#include "core/files/output_folder.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

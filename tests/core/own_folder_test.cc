@@ -1,4 +1,4 @@
-#include "core/own_folder.h"
+#include "core/files/own_folder.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

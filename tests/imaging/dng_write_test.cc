@@ -9,7 +9,7 @@
 #include <thread>
 #include <vector>
 
-#include "core/file_io.h"
+#include "core/files/file_io.h"
 #include "imaging/dng.h"
 #include "imaging/raw.h"
 #include "tests/imaging/dng.h"

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "core/file_io.h"
+#include "core/files/file_io.h"
 #include "pipelines/simulate/simulate.h"
 #include "rig/pixel_pitch.h"
 #include "rig/projection.h"

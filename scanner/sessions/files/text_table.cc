@@ -3,7 +3,7 @@
 #include <charconv>
 #include <cmath>
 
-#include "core/file_io.h"
+#include "core/files/file_io.h"
 #include "core/sha256.h"
 
 namespace sateen {

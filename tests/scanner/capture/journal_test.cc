@@ -2,7 +2,7 @@
 
 #include <gmock/gmock.h>
 
-#include "core/file_io.h"
+#include "core/files/file_io.h"
 #include "tests/scanner/sessions/dataset_files.h"
 #include "tests/testing/files.h"
 #include "tests/testing/full_disk.h"

@@ -7,7 +7,7 @@
 #include "scanner/checks/frame_compare.h"
 #include "scanner/checks/gloss_shift.h"
 #include "scanner/checks/shift_correlation.h"
-#include "scanner/sessions/frame_shift.h"
+#include "scanner/sessions/frames/frame_shift.h"
 #include "solver/evaluate.h"
 #include "solver/lambertian.h"
 #include "tests/scanner/checks/simulated_looks.h"

@@ -1,9 +1,9 @@
-#include "scanner/daemon/access.h"
+#include "scanner/daemon/http/access.h"
 
 #include <gmock/gmock.h>
 #include <sys/stat.h>
 
-#include "scanner/daemon/listener.h"
+#include "scanner/daemon/http/listener.h"
 #include "tests/testing/files.h"
 
 namespace sateen::access_test {

@@ -4,7 +4,7 @@
 
 #include <optional>
 
-#include "scanner/daemon/http_server.h"
+#include "scanner/daemon/http/http_server.h"
 #include "tests/scanner/daemon/daemon_fakes.h"
 #include "tests/testing/files.h"
 

@@ -1,4 +1,4 @@
-#include "scanner/daemon/http_client.h"
+#include "scanner/daemon/http/http_client.h"
 
 #include <gmock/gmock.h>
 #include <poll.h>
@@ -11,8 +11,8 @@
 #include <thread>
 
 #include "scanner/daemon/answer_json.h"
-#include "scanner/daemon/event_parser.h"
-#include "scanner/daemon/http_server.h"
+#include "scanner/daemon/http/event_parser.h"
+#include "scanner/daemon/http/http_server.h"
 #include "tests/scanner/daemon/daemon_fakes.h"
 #include "tests/testing/files.h"
 

@@ -1,4 +1,4 @@
-#include "scanner/daemon/http_server.h"
+#include "scanner/daemon/http/http_server.h"
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>

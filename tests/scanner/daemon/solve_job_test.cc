@@ -7,10 +7,10 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
-#include "core/file_io.h"
+#include "core/files/file_io.h"
 #include "pipelines/simulate/simulate.h"
 #include "rig/rig.h"
-#include "scanner/daemon/http_server.h"
+#include "scanner/daemon/http/http_server.h"
 #include "simulation/rigs.h"
 #include "tests/scanner/daemon/daemon_fakes.h"
 #include "tests/scanner/daemon/http_talk.h"

@@ -10,10 +10,10 @@
 #include <string>
 #include <vector>
 
-#include "core/file_io.h"
+#include "core/files/file_io.h"
 #include "pipelines/simulate/simulate.h"
 #include "rig/rig.h"
-#include "scanner/daemon/listener.h"
+#include "scanner/daemon/http/listener.h"
 #include "simulation/rigs.h"
 #include "tests/scanner/daemon/daemon_fakes.h"
 #include "tests/testing/files.h"

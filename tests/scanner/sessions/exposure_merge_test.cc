@@ -1,4 +1,4 @@
-#include "scanner/sessions/exposure_merge.h"
+#include "scanner/sessions/frames/exposure_merge.h"
 
 #include <gmock/gmock.h>
 

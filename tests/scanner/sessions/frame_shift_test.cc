@@ -1,4 +1,4 @@
-#include "scanner/sessions/frame_shift.h"
+#include "scanner/sessions/frames/frame_shift.h"
 
 #include <gmock/gmock.h>
 

@@ -1,4 +1,4 @@
-#include "scanner/sessions/mosaic_loader.h"
+#include "scanner/sessions/frames/mosaic_loader.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

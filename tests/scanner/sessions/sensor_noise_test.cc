@@ -1,4 +1,4 @@
-#include "scanner/sessions/sensor_noise.h"
+#include "scanner/sessions/frames/sensor_noise.h"
 
 #include <gmock/gmock.h>
 

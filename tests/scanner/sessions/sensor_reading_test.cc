@@ -1,4 +1,4 @@
-#include "scanner/sessions/sensor_reading.h"
+#include "scanner/sessions/frames/sensor_reading.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

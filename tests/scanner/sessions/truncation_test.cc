@@ -1,5 +1,5 @@
 // Whatever part of a text file is missing, the answer is an error or a dataset that holds together.
-#include "core/file_io.h"
+#include "core/files/file_io.h"
 #include "tests/scanner/sessions/dataset_files.h"
 
 namespace sateen::truncation_test {

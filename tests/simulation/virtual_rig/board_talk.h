@@ -14,7 +14,7 @@
 #include "firmware/protocol/codec.h"
 #include "firmware/protocol/frame.h"
 #include "scanner/devices/board_link.h"
-#include "simulation/virtual_rig/virtual_board.h"
+#include "simulation/virtual_rig/board/virtual_board.h"
 #include "tests/testing/places.h"
 
 // Speaks the protocol with the firmware, frame by frame, in simulated time.

@@ -5,7 +5,7 @@
 
 #include "cli/capture.h"
 #include "cli/preview.h"
-#include "core/file_io.h"
+#include "core/files/file_io.h"
 #include "tests/simulation/virtual_rig/capture_fakes.h"
 
 // `sateen capture` and `sateen preview` on the real firmware in simulated time.

@@ -14,8 +14,8 @@
 #include "scanner/capture/capture_session.h"
 #include "simulation/rigs.h"
 #include "simulation/sensor.h"
-#include "simulation/virtual_rig/simulated_port.h"
-#include "simulation/virtual_rig/virtual_board.h"
+#include "simulation/virtual_rig/board/simulated_port.h"
+#include "simulation/virtual_rig/board/virtual_board.h"
 #include "tests/simulation/virtual_rig/board_talk.h"
 #include "tests/testing/files.h"
 

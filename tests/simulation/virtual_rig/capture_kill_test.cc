@@ -7,7 +7,7 @@
 #include <atomic>
 #include <cerrno>
 
-#include "core/file_io.h"
+#include "core/files/file_io.h"
 #include "scanner/capture/session_proof.h"
 #include "tests/simulation/virtual_rig/capture_fakes.h"
 

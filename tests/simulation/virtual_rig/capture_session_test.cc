@@ -5,7 +5,7 @@
 #include <cmath>
 #include <set>
 
-#include "core/file_io.h"
+#include "core/files/file_io.h"
 #include "scanner/capture/session_proof.h"
 #include "scanner/sessions/dataset.h"
 #include "tests/scanner/sessions/dataset_files.h"

@@ -15,9 +15,9 @@
 #include <utility>
 #include <vector>
 
-#include "scanner/daemon/access.h"
 #include "scanner/daemon/api.h"
-#include "scanner/daemon/http_server.h"
+#include "scanner/daemon/http/access.h"
+#include "scanner/daemon/http/http_server.h"
 #include "scanner/daemon/rig_service.h"
 #include "tests/scanner/daemon/http_talk.h"
 #include "tests/simulation/virtual_rig/capture_fakes.h"

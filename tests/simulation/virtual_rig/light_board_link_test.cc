@@ -2,8 +2,8 @@
 
 #include "firmware/controller/pins.h"
 #include "scanner/devices/light_board.h"
-#include "simulation/virtual_rig/line_stress.h"
-#include "simulation/virtual_rig/simulated_port.h"
+#include "simulation/virtual_rig/board/line_stress.h"
+#include "simulation/virtual_rig/board/simulated_port.h"
 #include "tests/simulation/virtual_rig/board_talk.h"
 
 // The host's LightBoard and the board's real firmware, in simulated time.

@@ -1,4 +1,4 @@
-#include "simulation/virtual_rig/light_log.h"
+#include "simulation/virtual_rig/board/light_log.h"
 
 #include <gmock/gmock.h>
 

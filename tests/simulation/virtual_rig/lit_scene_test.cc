@@ -1,12 +1,12 @@
-#include "simulation/virtual_rig/lit_scene.h"
+#include "simulation/virtual_rig/camera/lit_scene.h"
 
 #include <gmock/gmock.h>
 
 #include <future>
 
 #include "imaging/raw.h"
-#include "simulation/virtual_rig/rig_camera.h"
-#include "simulation/virtual_rig/scene_camera.h"
+#include "simulation/virtual_rig/camera/rig_camera.h"
+#include "simulation/virtual_rig/camera/scene_camera.h"
 #include "tests/simulation/virtual_rig/small_scene.h"
 
 namespace sateen::testing::lit_scene_test {

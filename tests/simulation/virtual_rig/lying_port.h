@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "scanner/devices/board_link.h"
-#include "simulation/virtual_rig/simulated_port.h"
+#include "simulation/virtual_rig/board/simulated_port.h"
 #include "tests/simulation/virtual_rig/board_talk.h"
 
 // A board that does as it is told, and says something else: the real firmware, whose answers are

@@ -1,7 +1,7 @@
 #include <cstdlib>
 #include <nlohmann/json.hpp>
 
-#include "core/file_io.h"
+#include "core/files/file_io.h"
 #include "scanner/capture/session_proof.h"
 #include "tests/simulation/virtual_rig/capture_fakes.h"
 #include "tests/simulation/virtual_rig/program_runs.h"

@@ -7,10 +7,10 @@
 #include <csignal>
 #include <cstdlib>
 
-#include "core/file_io.h"
+#include "core/files/file_io.h"
 #include "imaging/dng.h"
 #include "imaging/raw.h"
-#include "simulation/virtual_rig/ptp_responder.h"
+#include "simulation/virtual_rig/camera/ptp_responder.h"
 #include "tests/scanner/sessions/dataset_files.h"
 #include "tests/testing/files.h"
 

@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "imaging/raw.h"
-#include "simulation/virtual_rig/ptp_wire.h"
+#include "simulation/virtual_rig/camera/ptp_wire.h"
 #include "tests/simulation/virtual_rig/board_talk.h"
 #include "tests/simulation/virtual_rig/small_scene.h"
 #include "tests/testing/files.h"

@@ -1,4 +1,4 @@
-#include "simulation/virtual_rig/scene_frame.h"
+#include "simulation/virtual_rig/camera/scene_frame.h"
 
 #include <gmock/gmock.h>
 

@@ -12,7 +12,7 @@
 #include "rig/rig.h"
 #include "scanner/sessions/session.h"
 #include "simulation/rigs.h"
-#include "simulation/virtual_rig/lit_scene.h"
+#include "simulation/virtual_rig/camera/lit_scene.h"
 #include "tests/testing/files.h"
 
 // A scene of a few pixels that differs with the light, the colour and the place.
