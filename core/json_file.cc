@@ -10,6 +10,7 @@ namespace {
 
 using Json = nlohmann::json;
 
+constexpr int kMaxNodes = 1 << 18;  // a session of 10,000 frames has half as many
 constexpr int kMaxDepth = 64;  // our formats use 4; writing a deeper one could exhaust the stack
 
 // Reads JSON for what the finished value does not show: keys given twice, deep nesting. Stops at the
@@ -25,9 +26,12 @@ class ParseWatch : public nlohmann::json_sax<Json> {
   bool binary(binary_t& /*value*/) override { return true; }
   bool start_object(size_t /*elements*/) override {
     keys_.emplace_back();
-    return Descend();
+    return Count() && Descend();
   }
   bool key(string_t& key) override {
+    if (!Count()) {
+      return false;
+    }
     if (!keys_.back().insert(key).second) {
       problem_ = fmt::format("the key \"{}\" is given twice in one object; keep one", key);
     }
@@ -38,7 +42,7 @@ class ParseWatch : public nlohmann::json_sax<Json> {
     --depth_;
     return true;
   }
-  bool start_array(size_t /*elements*/) override { return Descend(); }
+  bool start_array(size_t /*elements*/) override { return Count() && Descend(); }
   bool end_array() override {
     --depth_;
     return true;
@@ -54,6 +58,13 @@ class ParseWatch : public nlohmann::json_sax<Json> {
   [[nodiscard]] const std::string& Problem() const { return problem_; }
 
  private:
+  // Counts what takes far more memory than text.
+  bool Count() {
+    if (++nodes_ > kMaxNodes) {
+      problem_ = fmt::format("has more than {} keys, objects and arrays", kMaxNodes);
+    }
+    return problem_.empty();
+  }
   bool Descend() {
     if (++depth_ > kMaxDepth) {
       problem_ = fmt::format("nested deeper than {} levels", kMaxDepth);
@@ -63,6 +74,7 @@ class ParseWatch : public nlohmann::json_sax<Json> {
 
   std::vector<std::set<std::string>> keys_;  // keys of each open object
   int depth_ = 0;
+  int nodes_ = 0;
   std::string problem_;
 };
 

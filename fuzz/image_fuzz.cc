@@ -12,14 +12,18 @@ void Try(std::string_view bytes) {
   if (const auto file = InputFile::Open(path)) {
     static_cast<void>(CheckTiffIsWhole(*file));
   }
-  if (const auto photo = ReadPhoto(path)) {
+  const auto photo = ReadPhoto(path);
+  Need(photo || photo.error().code != ErrorCode::kOutOfMemory);
+  if (photo) {
     const ImageSize read = photo->rgb.Size();
     Need(read.width > 0 && read.height > 0);
     for (const Image<float>& plane : photo->rgb.planes) {
       Need(plane.Size() == read && plane.pixels.size() == read.PixelCount());
     }
   }
-  if (const auto mosaic = ReadRawMosaic(path)) {
+  const auto mosaic = ReadRawMosaic(path);
+  Need(mosaic || mosaic.error().code != ErrorCode::kOutOfMemory);
+  if (mosaic) {
     Need(mosaic->samples.width >= 2 && mosaic->samples.height >= 2 &&
          mosaic->black < mosaic->white);
     Need(Demosaic(*mosaic).Size() == mosaic->samples.Size());

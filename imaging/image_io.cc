@@ -100,7 +100,11 @@ Result<std::vector<T>> ReadSamples(const std::filesystem::path& path, OIIO::Imag
   // If a JPEG or an uncompressed TIFF is cut short, only the error text tells: the call succeeds
   // and the rest is grey.
   if (!complete || input.has_error()) {
-    return Undecodable(path, input.geterror());
+    const std::string reason = input.geterror();
+    if (reason.find("bad_alloc") != std::string::npos) {  // OpenImageIO turns it into words
+      throw std::bad_alloc();
+    }
+    return Undecodable(path, reason);
   }
   return samples;
 }

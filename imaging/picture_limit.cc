@@ -29,8 +29,8 @@ Status PictureLimit::Check(const std::filesystem::path& path, ImageSize header_p
   if (pixels > most) {
     return Fail(ErrorCode::kBadData,
                 "{}: its header says {} x {} pixels in {} bytes; at most {:.0f} megapixels are "
-                "read from it: if it is a picture, save it uncompressed, or raise --max-megapixels "
-                "of sateen solve",
+                "read from it: if it is right, save it uncompressed; sateen solve also takes "
+                "--max-megapixels",
                 path.string(), header_px.width, header_px.height, file_bytes,
                 1e-6 * static_cast<double>(most));
   }

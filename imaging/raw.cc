@@ -190,6 +190,12 @@ Status CheckLimit(const std::filesystem::path& path, const Opened& opened,
   });
 }
 
+void ThrowIfNoMemory(int libraw_status) {
+  if (libraw_status == LIBRAW_UNSUFFICIENT_MEMORY) {
+    throw std::bad_alloc();
+  }
+}
+
 Result<Opened> Open(const std::filesystem::path& path, const PictureLimit& limit) {
   Result<InputFile> file = InputFile::Open(path);
   if (!file) {
@@ -207,6 +213,7 @@ Result<Opened> Open(const std::filesystem::path& path, const PictureLimit& limit
   Opened opened{*std::move(file), std::make_unique<LibRaw>(LIBRAW_OPTIONS_NONE)};
   opened.raw->set_dataerror_handler(nullptr, nullptr);  // it would print to stderr
   const int status = opened.raw->open_file(opened.file.LibraryName().c_str());
+  ThrowIfNoMemory(status);
   if (status != LIBRAW_SUCCESS) {
     return tl::unexpected(CheckDecoded(path, *opened.raw, status).error());
   }
@@ -218,9 +225,7 @@ Result<Opened> Open(const std::filesystem::path& path, const PictureLimit& limit
 
 Status Unpack(const std::filesystem::path& path, Opened& opened) {
   const int status = opened.raw->unpack();
-  if (status == LIBRAW_UNSUFFICIENT_MEMORY) {
-    throw std::bad_alloc();
-  }
+  ThrowIfNoMemory(status);
   return CheckDecoded(path, *opened.raw, status);
 }
 

@@ -3,9 +3,11 @@
 #include <matio.h>
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <memory>
+#include <new>
 #include <string_view>
 
 #include "core/files/input_file.h"
@@ -92,15 +94,20 @@ Result<Image3> ReadMatVariable(const fs::path& path, mat_t* file, ImageSize size
   }
   const size_t height = variable->dims[0];
   const size_t width = variable->dims[1];
-  if (height != static_cast<size_t>(size_px.height) ||
-      width != static_cast<size_t>(size_px.width)) {
-    return Fail(ErrorCode::kBadData,
-                "{}: is {} x {} px, but the first frame is {} x {} px; need one size",
-                path.string(), width, height, size_px.width, size_px.height);
+  constexpr size_t kMostSide = 1 << 30;
+  const ImageSize size{static_cast<int>(std::min(width, kMostSide)),
+                       static_cast<int>(std::min(height, kMostSide))};
+  if (const Status same = CheckSize(path.string(), size, size_px); !same) {
+    return tl::unexpected(same.error());
+  }
+  // matio tells a lack of memory and a damaged array alike.
+  const size_t bytes = height * width * 3 * sizeof(double);
+  if (std::unique_ptr<char[]>(new (std::nothrow) char[bytes]) == nullptr) {
+    return OutOfMemory(path, size, bytes);
   }
   if (Mat_VarReadDataAll(file, variable.get()) != 0 || variable->data == nullptr ||
       variable->data_type != MAT_T_DOUBLE ||
-      variable->nbytes != height * width * 3 * sizeof(double)) {
+      variable->nbytes != bytes) {
     return Fail(ErrorCode::kBadData, "{}: {} is not an array of H x W x 3 real doubles",
                 path.string(), kVariable);
   }

@@ -227,6 +227,19 @@ TEST(ReadJsonFile, EndlessNestingIsAnErrorAndNotACrash) {
               HasSubstr("nested deeper than 64 levels"));
 }
 
+// An empty object takes two letters of text and some sixty bytes of memory.
+TEST(ReadJsonFile, MillionsOfObjectsAreAnError) {
+  const auto message = [](int count) {
+    std::string objects;
+    for (int i = 0; i < count; ++i) {
+      objects += "{},";
+    }
+    return MessageOfFile(R"({"schema": "sateen.rig/1", "a": [)" + objects + "{}]}");
+  };
+  EXPECT_THAT(message(262'139), IsEmpty());  // with 2 keys, an object, an array and the last
+  EXPECT_THAT(message(262'140), HasSubstr("has more than 262144 keys, objects and arrays"));
+}
+
 TEST(ReadJsonFile, MissingFileIsAnIoError) {
   const Result<Json> file = ReadJsonFile("/nowhere/rig.json", "sateen.rig", 1);
   ASSERT_FALSE(file);

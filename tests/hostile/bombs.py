@@ -79,6 +79,16 @@ def exr(width, height, compression=2, more=b'', version=2, data=bytes(2000)):
             attribute(b'screenWindowWidth', b'float', struct.pack('<f', 1)) + more + b'\0' + data)
 
 
+def exr_of_zeros(width, height):
+    """An uncompressed EXR that is right: an offset for each row, then the rows."""
+    head = exr(width, height, compression=0, data=b'')
+    row_bytes = 8 + 4 * width
+    start = len(head) + 8 * height
+    offsets = b''.join(struct.pack('<Q', start + y * row_bytes) for y in range(height))
+    rows = b''.join(struct.pack('<iI', y, 4 * width) + bytes(4 * width) for y in range(height))
+    return head + offsets + rows
+
+
 def dng(width, height, compression, data):
     """A DNG of one CFA picture."""
     entries = [(254, 4, 1, 0), (256, 4, 1, width), (257, 4, 1, height), (258, 3, 1, 16),
@@ -160,10 +170,12 @@ def pictures():
 def texts():
     """Bombs in place of records and tables: how they are given, name and bytes."""
     yield 'rig', 'deep.json', b'[' * 5_000_000
-    yield 'rig', 'wide.json', b'[' + b'{},' * 1_390_000 + b'{}]'
-    yield 'rig', 'keys.json', b'{' + b','.join(b'"%d":0' % i for i in range(370_000)) + b'}'
+    yield 'rig', 'wide.json', b'[' + b'{},' * 4_000_000 + b'{}]'
+    yield 'rig', 'keys.json', b'{' + b','.join(b'"%d":0' % i for i in range(1_200_000)) + b'}'
     yield 'rig', 'long.json', b'{"schema":"' + b'a' * 50_000_000 + b'"}'
-    yield 'capture', 'many.lp', b'340000\n' + b'a.png 0 0 1\n' * 340_000
+    yield 'capture', 'many.lp', b'170000\n' + b'a.png 0 0 1\n' * 170_000
+    yield 'rig', 'numbers.json', b'[' + b'0,' * 8_000_000 + b'0]'
+    yield 'capture', 'lines.lp', b'1\n' * 1_000_000
     yield 'capture', 'says-many.lp', b'1000000000\na.png 0 0 1\n'
     yield 'mask', 'mask.png', png(20000, 20000, 8, 0, zeros(20001 * 20000))
     yield 'truth', 'Normal_gt.mat', mat(20000, 20000, 400 << 20)
@@ -231,15 +243,21 @@ def cases(work):
 
 
 def try_without_room(program, work, tally):
-    """Five frames of 20 megapixels, which are right, in 500 MB of address space."""
-    folder = work / 'large'
-    write_folder(folder)
-    frame = png(5000, 4000, 8, 0, zlib.compress(bytes(5001 * 4000)))
-    for i in range(5):
-        (folder / f'{i}.png').write_bytes(frame)
-    outcome = runner.run([program, 'solve', folder, '-o', work / 'out'], CLOCK_SECONDS, 500 << 20)
-    said = outcome.status == 1 and 'out of memory' in outcome.err and 'damaged' not in outcome.err
-    tally.add('no room for large frames', outcome, '' if said else 'is not called out of memory')
+    """Frames of 20 megapixels, which are right, in 500 MB of address space."""
+    frames = {'.png': png(5000, 4000, 8, 0, zlib.compress(bytes(5001 * 4000))),
+              '.exr': exr_of_zeros(5000, 4000)}
+    for ending, frame in frames.items():
+        folder = work / f'large{ending}'
+        write_folder(folder)
+        for i in range(5):
+            (folder / f'{i}.png').unlink()
+            (folder / f'{i}{ending}').write_bytes(frame)
+        outcome = runner.run([program, 'solve', folder, '-o', work / 'out', '--threads', '1'],
+                             CLOCK_SECONDS, 500 << 20)
+        said = (outcome.status == 1 and 'out of memory' in outcome.err and
+                'damaged' not in outcome.err)
+        tally.add(f'no room for large {ending}', outcome,
+                  '' if said else 'is not called out of memory')
 
 
 def main():

@@ -5,12 +5,13 @@
 
 The list comes from the program's own --help: each option and positional that takes text, whether it
 is a path or not. Each run must end by itself within 2 s, refused with words and status 2 to 5.
-Without --all: a pipe, an endless device and a loop of links alone.
+Without --all: a pipe, an endless device and a loop of links alone, and not for benchmarks.
 """
 
 import os
 import pathlib
 import re
+import shutil
 import signal
 import socket
 import stat
@@ -112,29 +113,30 @@ def with_option(line, option, path):
     return line + [option, path]
 
 
-def make_special_files(folder, all_kinds):
-    files = {}
+# Kinds of special file, the first ones tried without --all.
+KINDS = ('pipe', 'device', 'loop', 'terminal', 'dangling', 'folder', 'socket', 'unreadable')
+FEW = 3
 
-    def add(name):
-        files[name] = folder / name
-        return files[name]
 
-    os.mkfifo(add('pipe'))
-    if os.geteuid() == 0:  # a device of its own: a faulty program could replace the system's
-        os.mknod(add('endless-device'), 0o600 | stat.S_IFCHR, os.makedev(1, 5))
+def make(kind, path):
+    """Makes a special file. Returns False where this user cannot."""
+    if kind == 'pipe':
+        os.mkfifo(path)
+    elif kind == 'device' and os.geteuid() == 0:
+        # Endless, and of its own: a faulty program could replace the system's.
+        os.mknod(path, 0o600 | stat.S_IFCHR, os.makedev(1, 5))
+    elif kind == 'folder':
+        path.mkdir()
+    elif kind == 'socket':
+        with socket.socket(socket.AF_UNIX) as server:
+            server.bind(str(path))
+    elif kind == 'unreadable':
+        path.touch(0)
+        return os.geteuid() != 0  # root reads everything
     else:
-        os.symlink('/dev/zero', add('endless-device'))
-    os.symlink('link-loop', add('link-loop'))
-    if not all_kinds:
-        return files
-    os.symlink('/dev/tty', add('terminal'))
-    os.symlink('nowhere', add('dangling-link'))
-    add('folder').mkdir()
-    with socket.socket(socket.AF_UNIX) as server:
-        server.bind(str(add('socket')))
-    if os.geteuid() != 0:
-        add('unreadable').touch(0)
-    return files
+        os.symlink({'device': '/dev/zero', 'loop': path.name, 'terminal': '/dev/tty',
+                    'dangling': 'nowhere'}[kind], path)
+    return True
 
 
 def serve_ends(words):
@@ -152,57 +154,116 @@ def serve_ends(words):
         return 'SIGTERM does not end the daemon'
 
 
-def fault_of(outcome, option, kind):
+def fault_of(outcome, may_be_done):
+    """What is wrong with how a run ended, or nothing."""
     if outcome.status is None:
         return 'does not end'
     if outcome.status in runner.REFUSED:
         return '' if outcome.err.strip() else 'is refused without words'
-    if outcome.status == runner.DONE and kind == 'folder':  # some take one
-        return ''
-    # A name that is replaced (an output), or that is not a path.
-    if outcome.status == runner.DONE and option in FREE | {'--output', '--plot', '--markdown'}:
-        return ''
-    return 'is not refused'
+    return '' if outcome.status == runner.DONE and may_be_done else 'is not refused'
 
 
-def try_command(program, words, line, kinds, tally):
-    options, positionals = texts(program, words)
+class Trial:
+    """Runs commands with a special file in one place, each with a new one."""
+
+    def __init__(self, program, work, kinds):
+        self.program = program
+        self.work = work
+        self.kinds = kinds
+        self.tally = runner.Tally()
+        self.count = 0
+
+    def run(self, name, place, words_of, may_be_done):
+        """`place(kind)` makes the file and returns its path; `words_of(path)` is the command."""
+        for kind in self.kinds:
+            path = place(kind)
+            if path is None:
+                continue
+            before = os.lstat(path)
+            words = [self.program, *words_of(path)]
+            if words[1] == 'serve':
+                outcome, fault = runner.Outcome(0, 0.0, 0.0, 0, ''), serve_ends(words)
+            else:
+                outcome = runner.run(words, CLOCK_SECONDS)
+                fault = fault_of(outcome, may_be_done(kind))
+                measures = words[1] == 'bench'  # before it writes
+                if not fault and outcome.busy_seconds > SECONDS and not measures:
+                    fault = f'takes more than {SECONDS:g} s of processor time'
+            after = os.lstat(path) if os.path.lexists(path) else None
+            if not fault and (after is None or
+                              (before.st_ino, before.st_mode) != (after.st_ino, after.st_mode)):
+                fault = 'replaces it'
+            self.tally.add(f'{name} <- {kind}', outcome, fault)
+
+    def new_path(self, kind):
+        """Makes a special file in a folder of its own."""
+        self.count += 1
+        folder = self.work / f'special-{self.count}'
+        folder.mkdir()
+        return folder / kind if make(kind, folder / kind) else None
+
+    def in_session(self, name):
+        """Returns a place(): a copy of the session with a special file for one of its files."""
+        def place(kind):
+            self.count += 1
+            session = self.work / f'session-{self.count}'
+            shutil.copytree(self.work / 'session', session)
+            (session / name).unlink(missing_ok=True)
+            return session / name if make(kind, session / name) else None
+        return place
+
+
+def try_options(trial, words, line):
+    """A special file for every option and the first positional that takes text."""
+    options, positionals = texts(trial.program, words)
     lines = [(option, lambda path, o=option: with_option(line, o, path)) for option in options]
     if positionals:
         lines.append((positionals[0], lambda path: [path, *line[1:]]))
-    for option, make in lines:
-        for kind, path in kinds.items():
-            full = [program, *words, *make(path)]
-            name = f'{" ".join(words)} {option} <- {kind}'
-            if words == ['serve']:
-                tally.add(name, runner.Outcome(0, 0.0, 0.0, 0, ''), serve_ends(full))
-                continue
-            outcome = runner.run(full, CLOCK_SECONDS)
-            fault = fault_of(outcome, option, kind)
-            measures = words[0] == 'bench'  # before it writes
-            if not fault and outcome.busy_seconds > SECONDS and not measures:
-                fault = f'takes more than {SECONDS:g} s of processor time'
-            tally.add(name, outcome, fault)
+    for option, line_of in lines:
+        output = option in ('--output', '--plot', '--markdown', '--pictures')
+        trial.run(f'{" ".join(words)} {option}', trial.new_path,
+                  lambda path, make_line=line_of: [*words, *make_line(path)],
+                  lambda kind, o=option, out=output: o in FREE or kind == 'folder' or
+                  (out and kind == 'dangling'))
+
+
+def try_session(trial, work):
+    """A special file for every file of a session that somebody reads."""
+    solve = ['solve', '-o', work / 'out']
+    uses = {'session.json': (solve, ['session', 'verify'], ['session', 'overview'],
+                             ['calibrate', 'lights', '-o', work / 'l.json', '--sheet']),
+            'rig.json': (solve,), 'frames/led-1.dng': (solve, ['session', 'verify']),
+            'truth/normal.exr': (solve,), 'mask.png': (solve,),
+            'journal.jsonl': (['capture', '--port', work / 'no-port', '--resume'],)}
+    for name, commands_ in uses.items():
+        depth = len(pathlib.PurePath(name).parts)
+        for words in commands_:
+            trial.run(f'{" ".join(str(word) for word in words[:2])}, {name} of the session',
+                      trial.in_session(name),
+                      lambda path, w=words, d=depth: [*w, path.parents[d - 1]],
+                      # A mask that is no file is none, and a link to nothing is no file.
+                      lambda kind, n=name: n == 'mask.png' or
+                      (kind == 'dangling' and n.startswith('truth')))
 
 
 def main():
     program = pathlib.Path(sys.argv[1]).resolve()
-    tally = runner.Tally()
     with tempfile.TemporaryDirectory() as temp:
         work = pathlib.Path(temp)
         (work / 'rig.json').write_text(RIG)
         (work / 'scene.json').write_text(SCENE)
-        (work / 'circles.txt').write_text('1.png 20 20 10\n')
+        (work / 'circles.txt').write_text('20 20 10\n')
         subprocess.run([program, 'simulate', work / 'scene.json', '-o', work / 'session'],
                        check=True, stdout=subprocess.DEVNULL)
-        (work / 'special').mkdir()
-        kinds = make_special_files(work / 'special', '--all' in sys.argv)
+        trial = Trial(program, work, KINDS if '--all' in sys.argv else KINDS[:FEW])
         lines = command_lines(work)
         for words in commands(program):
             if ' '.join(words) not in lines:
                 sys.exit(f'{" ".join(words)}: no command line in {__file__}; add one')
-            try_command(program, words, lines[' '.join(words)], kinds, tally)
-    tally.end()
+            if '--all' in sys.argv or words[0] != 'bench':  # seconds for each
+                try_options(trial, words, lines[' '.join(words)])
+        try_session(trial, work)
+    trial.tally.end()
 
 
 if __name__ == '__main__':

@@ -12,6 +12,7 @@ namespace {
 constexpr std::string_view kBlanks = " \t\r\v\f";
 constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
 constexpr size_t kMaxShown = 40;
+constexpr uint64_t kMaxTableBytes = uint64_t{2} << 20;  // 50,000 lights
 
 // Returns the word as a message can show it, whatever bytes a wrong file holds.
 std::string Show(std::string_view word) {
@@ -50,7 +51,7 @@ std::string PlaceOf(const std::filesystem::path& path, int line_number) {
 
 Result<std::vector<TextLine>> ReadTextLines(const std::filesystem::path& path,
                                             std::map<std::string, std::string>& sha256_of_input) {
-  const Result<std::string> bytes = ReadFileBytes(path);
+  const Result<std::string> bytes = ReadFileBytes(path, kMaxTableBytes);
   if (!bytes) {
     return tl::unexpected(bytes.error());
   }
