@@ -106,8 +106,7 @@ Result<Image3> ReadMatVariable(const fs::path& path, mat_t* file, ImageSize size
     return OutOfMemory(path, size, bytes);
   }
   if (Mat_VarReadDataAll(file, variable.get()) != 0 || variable->data == nullptr ||
-      variable->data_type != MAT_T_DOUBLE ||
-      variable->nbytes != bytes) {
+      variable->data_type != MAT_T_DOUBLE || variable->nbytes != bytes) {
     return Fail(ErrorCode::kBadData, "{}: {} is not an array of H x W x 3 real doubles",
                 path.string(), kVariable);
   }

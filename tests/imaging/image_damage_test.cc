@@ -152,7 +152,8 @@ TEST(ReadPhoto, RefusesMorePixelsThanAPhotographOfItsBytesHas) {
   const Result<Photo> photo = ReadPhoto(path);
   ASSERT_FALSE(photo);
   EXPECT_EQ(photo.error().code, ErrorCode::kBadData);
-  EXPECT_THAT(photo.error().message, HasSubstr("65535 x 65535 pixels in 2000000 bytes; at most 128 megapixels"));
+  EXPECT_THAT(photo.error().message,
+              HasSubstr("65535 x 65535 pixels in 2000000 bytes; at most 128 megapixels"));
 }
 
 }  // namespace

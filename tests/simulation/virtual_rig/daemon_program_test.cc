@@ -96,8 +96,8 @@ TEST(DaemonProgram, EndsOnSigtermUnderRequestsForSpecialFiles) {
 
 // A reader that goes away is an error, not the end by a signal.
 TEST(DaemonProgram, AClosedPipeIsAnErrorOfWriting) {
-  const ShellResult closed =
-      Shell("{ (sleep 0.2; '" + kSateen + "' simulate --list; echo status $? >&2) | :; } 2>&1");
+  const ShellResult closed = Shell("cd '" + SourceDir() + "' && { (sleep 0.2; '" + kSateen +
+                                   "' simulate --list; echo status $? >&2) | :; } 2>&1");
   EXPECT_THAT(closed.out, HasSubstr("standard output cannot be written"));
   EXPECT_THAT(closed.out, HasSubstr("status 4"));
 }
