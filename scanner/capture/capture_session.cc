@@ -72,7 +72,7 @@ Result<std::vector<double>> CaptureSession::Meter(std::size_t light, FrameTaker&
   return FindExposures(
       GetRig(), light,
       {.kind = Record().begun.kind, .brackets = Record().begun.brackets, .tries = options_.tries},
-      store_.Incoming(), taker, observer);
+      store_.Incoming() / "test", taker, observer);
 }
 
 Status CaptureSession::MakePlan(FrameTaker& taker) {

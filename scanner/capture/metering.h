@@ -30,7 +30,8 @@ struct MeteringObserver {
 
 /// Finds the exposures of a scene by test frames of one light, at most 8 of them (ExposureSearch).
 ///
-/// folder   receives the test frames; it is emptied before each
+/// folder   receives the test frames; it is removed and made again before each, so that it must hold
+///          nothing else
 /// Returns  exposure times, ascending. [s]
 /// Errors   those of ExposureSearch and, after all tries, of the devices; kDevice: 8 test frames
 ///          were not enough

@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 
+#include <cmath>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -137,6 +138,15 @@ class LitCamera : public TetheredCamera {
   std::vector<Image3> images_;
   ExposureSettings settings_;
 };
+
+// Returns the exposure times of a camera of third stops. [s]
+inline std::vector<double> ThirdStops() {
+  std::vector<double> times_s;
+  for (double time_s = 0.0005; time_s < 2.0; time_s *= std::cbrt(2.0)) {
+    times_s.push_back(time_s);
+  }
+  return times_s;
+}
 
 inline CaptureOptions QuickCapture() {
   CaptureOptions options;

@@ -18,6 +18,7 @@ namespace {
 
 namespace fs = std::filesystem;
 using ::testing::Contains;
+using ::testing::EndsWith;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::Not;
@@ -112,9 +113,7 @@ TEST_F(CaptureTest, KeepsSettingsAndLevelInTheRecord) {
 // stops.
 TEST_F(CaptureTest, FindsTheExposure) {
   camera_.exposure_counts = true;
-  for (double time_s = 0.0005; time_s < 2.0; time_s *= std::cbrt(2.0)) {
-    camera_.times_s.push_back(time_s);
-  }
+  camera_.times_s = ThirdStops();
   CaptureOptions options = QuickCapture();
   options.exposure_s.reset();
   double peak = 0.0;
@@ -134,6 +133,25 @@ TEST_F(CaptureTest, FindsTheExposure) {
   EXPECT_GT(peak, 0.8 / std::cbrt(2.0) - 0.02);
   EXPECT_THAT(summary->session.frames, SizeIs(13));
   EXPECT_TRUE(VerifySession(dir_, {}));
+}
+
+// Without its mark, the folder of a run that is killed later would stay for ever.
+TEST_F(CaptureTest, MeteringLeavesTheMarkOfTheHiddenFolder) {
+  CaptureOptions options = QuickCapture();
+  options.exposure_s.reset();
+  camera_.exposure_counts = true;
+  camera_.times_s = ThirdStops();
+  int looks = 0;
+  Result<CaptureSession> session = CaptureSession::Begin(dir_, rig_file_, options);
+  ASSERT_TRUE(session);
+  camera_.on_exposed = [&](int /*capture*/) {
+    ++looks;
+    EXPECT_THAT(Listing(dir_), Contains(EndsWith("/.sateen-own"))) << looks;
+  };
+  const Result<CaptureSummary> summary = session->Run(*host_, camera_, {.threads = 1});
+  ASSERT_TRUE(summary) << summary.error().message;
+  EXPECT_GT(looks, 13) << "it did not meter";
+  EXPECT_THAT(Listing(dir_), Not(Contains(HasSubstr(".sateen"))));
 }
 
 // The rig has led-3 as one of ten alike; in truth it is much brighter.

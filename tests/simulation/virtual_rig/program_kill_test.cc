@@ -10,8 +10,8 @@
 
 // capture, resume, solve, simulate and calibrate, killed as by kill -9 at system calls that change
 // files. After each kill nothing is lost that was there, and the next run leaves what an undisturbed
-// one leaves, and nothing else. SATEEN_KILLS is the number of kills for each of the five; 0: at
-// every call.
+// one leaves, and nothing else. SATEEN_KILLS is the number of kills for each of them; 0: at every
+// call.
 namespace sateen::testing::program_kill_test {
 namespace {
 
@@ -95,10 +95,12 @@ class ProgramKill : public BoardTest {
   Status Capture(const fs::path& dir) {
     LightBoard host(std::make_unique<SimulatedPort>(*board_));
     LitCamera camera(*board_, images_);
+    camera.exposure_counts = !options_.exposure_s.has_value();
+    camera.times_s = ThirdStops();
     const bool begun =
         fs::exists(dir / kJournalFile) && ReadJournal(dir).value_or(std::nullopt).has_value();
-    return (begun ? CaptureSession::Resume(dir, QuickCapture())
-                  : CaptureSession::Begin(dir, Shared("rig.json"), QuickCapture()))
+    return (begun ? CaptureSession::Resume(dir, options_)
+                  : CaptureSession::Begin(dir, Shared("rig.json"), options_))
         .and_then([&](CaptureSession session) {
           return session.Record().complete ? session.Finish()
                                            : session.Run(host, camera, {.threads = 1});
@@ -118,6 +120,7 @@ class ProgramKill : public BoardTest {
 
   static TempFolder* shared_;
   TempFolder temp_;
+  CaptureOptions options_ = QuickCapture();
   std::vector<Image3> images_ = LightImages(CaptureRig());
 };
 TempFolder* ProgramKill::shared_ = nullptr;
@@ -129,6 +132,16 @@ TEST_F(ProgramKill, CaptureIsResumed) {
                                 ASSERT_EQ(Run(CaptureInto(dir)), 0);
                                 EXPECT_EQ(FilesOf(dir), FilesOf(undisturbed));
                               }});
+}
+
+TEST_F(ProgramKill, CaptureThatMetersIsResumed) {
+  options_.exposure_s.reset();
+  KillAtCalls("metering", {.body = [&](const fs::path& dir) { return CaptureInto(dir); },
+                           .holds =
+                               [&](const fs::path& dir, const fs::path& undisturbed) {
+                                 ASSERT_EQ(Run(CaptureInto(dir)), 0);
+                                 EXPECT_EQ(FilesOf(dir), FilesOf(undisturbed));
+                               }});
 }
 
 TEST_F(ProgramKill, ResumeIsResumed) {
