@@ -21,7 +21,6 @@ namespace fs = std::filesystem;
 
 constexpr const char* kMark = ".sateen-own";
 constexpr size_t kRandomLetters = 6;
-constexpr mode_t kPermissions = 0700;  // as mkdtemp() sets them
 
 enum class Lock { kTaken, kHeldByOther, kUnknown };
 
@@ -51,7 +50,7 @@ int OpenMark(const fs::path& folder) {
   if (mark >= 0 && (fstat(mark, &found) != 0 || !S_ISREG(found.st_mode))) {
     close(std::exchange(mark, -1));
   }
-  if (is_ours && mark < 0 && fstat(dir, &found) == 0 && (found.st_mode & 0777) == kPermissions) {
+  if (is_ours && mark < 0) {
     rmdir(folder.c_str());  // only where it is empty
   }
   close(dir);
@@ -124,7 +123,9 @@ OwnFolder::~OwnFolder() {
       failed = failed ? failed : ignored;
     }
     if (!failed) {
+      // A network disk keeps the name of a file, or another one for it, until it is closed.
       unlink((path_ / kMark).c_str());
+      close(std::exchange(lock_, -1));
       rmdir(path_.c_str());
     }
   }

@@ -12,8 +12,8 @@ namespace sateen {
 ///
 /// Its first entry is a mark, `.sateen-own`: a file that stays locked as long as the process lives.
 /// A later run knows by it what it may remove: a folder of the same user, with a mark that nobody
-/// holds. It is removed last, so a removal that is killed is gone on with. A folder that has such a
-/// name and no mark is left alone, unless it is empty: a process was killed before the mark.
+/// holds. It is removed last, so a removal that is killed is resumed. A folder that has such a name
+/// and no mark is left alone, unless it is empty: a process was killed before the mark.
 ///
 ///     process alive            locked, never touched by others
 ///     process killed           Abandoned() gives it to the next run, which removes it

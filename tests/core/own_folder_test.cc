@@ -3,15 +3,44 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>
+#include <sys/syscall.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <cerrno>
+#include <filesystem>
 #include <optional>
 #include <string>
 #include <utility>
 
 #include "tests/testing/files.h"
 #include "tests/testing/tree.h"
+
+namespace {
+
+bool is_network_disk = false;  // which keeps the entry of a file until the file is closed
+
+bool HasOpenFiles(const std::filesystem::path& folder) {
+  for (const auto& descriptor : std::filesystem::directory_iterator("/proc/self/fd")) {
+    std::error_code ignored;
+    const std::filesystem::path file = std::filesystem::read_symlink(descriptor, ignored);
+    if (file.parent_path() == folder) {
+      return true;
+    }
+  }
+  return false;
+}
+
+}  // namespace
+
+// Replaced in this program alone.
+extern "C" int rmdir(const char* path) {
+  if (is_network_disk && HasOpenFiles(path)) {
+    errno = ENOTEMPTY;
+    return -1;
+  }
+  return static_cast<int>(syscall(SYS_rmdir, path));
+}
 
 namespace sateen::own_folder_test {
 namespace {
@@ -60,6 +89,16 @@ TEST_F(OwnFolderTest, IsRemovedWithAllInItAndNothingElse) {
   EXPECT_THAT(testing::Listing(temp_.Path()), ElementsAre("mine"));
 }
 
+TEST_F(OwnFolderTest, IsRemovedFromANetworkDisk) {
+  is_network_disk = true;
+  {
+    const OwnFolder folder = OwnFolder::Make(temp_.Path(), kPrefix).value();
+    testing::WriteText(folder.Path() / "file", "x");
+  }
+  is_network_disk = false;
+  EXPECT_THAT(testing::Listing(temp_.Path()), IsEmpty());
+}
+
 TEST_F(OwnFolderTest, KeptFolderStays) {
   fs::path path;
   {
@@ -94,10 +133,12 @@ TEST_F(OwnFolderTest, OfALivingProcessIsNeverTouched) {
 TEST_F(OwnFolderTest, KilledBeforeItsMarkIsRemovedIfEmpty) {
   std::string name = (temp_.Path() / ".sateen-XXXXXX").string();
   ASSERT_NE(mkdtemp(name.data()), nullptr);
+  fs::create_directory(temp_.Path() / ".sateen-aaaaaa");  // as a disk of invented modes shows it
+  fs::permissions(temp_.Path() / ".sateen-aaaaaa", static_cast<fs::perms>(0755));
 
   EXPECT_THAT(Abandoned(), IsEmpty());
 
-  EXPECT_FALSE(fs::exists(name));
+  EXPECT_THAT(testing::Listing(temp_.Path()), IsEmpty());
 }
 
 TEST_F(OwnFolderTest, WhatOnlyLooksAlikeIsLeftAlone) {
@@ -113,8 +154,7 @@ TEST_F(OwnFolderTest, WhatOnlyLooksAlikeIsLeftAlone) {
   fs::create_directory(temp_.Path() / ".sateen-eeeeee");
   fs::create_symlink(far / own.filename() / ".sateen-own",
                      temp_.Path() / ".sateen-eeeeee/.sateen-own");
-  fs::create_directory(temp_.Path() / ".sateen-ffffff");  // empty, as mkdir makes it
-  fs::permissions(temp_.Path() / ".sateen-ffffff", static_cast<fs::perms>(0755));
+  testing::WriteText(temp_.Path() / ".sateen-ffffff/folder/notes", "no mark");
   testing::WriteText(temp_.Path() / ".sateen-incoming/.sateen-own", "");
   testing::WriteText(temp_.Path() / "sateen-gggggg/.sateen-own", "");
   testing::WriteText(temp_.Path() / ".sateen-hh_hhh/.sateen-own", "");
@@ -134,10 +174,14 @@ TEST_F(OwnFolderTest, OfAnotherUserIsLeftAlone) {
   }
   const fs::path left = LeftByKilledProcess();
   ASSERT_EQ(chown(left.c_str(), 65534, 65534), 0);
+  const fs::path empty = temp_.Path() / ".sateen-aaaaaa";
+  ASSERT_TRUE(fs::create_directory(empty));
+  ASSERT_EQ(chown(empty.c_str(), 65534, 65534), 0);
 
   EXPECT_THAT(Abandoned(), IsEmpty());
 
   EXPECT_TRUE(fs::exists(left / "deep/file"));
+  EXPECT_TRUE(fs::exists(empty));
 }
 
 TEST_F(OwnFolderTest, ErrorNamesTheFolderAndTheReason) {
