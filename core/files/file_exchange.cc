@@ -182,7 +182,7 @@ ExchangeUndone UndoExchange(const fs::path& staging, const fs::path& dir) {
 }
 
 void CleanUpAfterKills(const fs::path& dir) {
-  for (OwnFolder& left : OwnFolder::Abandoned(dir, kStagingPrefix)) {
+  for (OwnFolder& left : OwnFolder::Abandoned(dir, kStagingPrefix, Notice)) {
     const ExchangeUndone undone = UndoExchange(left.Path(), dir);
     if (undone.back > 0) {
       Notice(

@@ -44,7 +44,8 @@ struct ExchangeUndone {
                                           const std::filesystem::path& dir);
 
 // Removes the staging folders that killed runs left in `dir`, and puts back the files that one of
-// them had moved aside; a notice says so.
+// them had moved aside; a notice says so. Notices name, too, what may be such a folder and cannot be
+// known to be one.
 void CleanUpAfterKills(const std::filesystem::path& dir);
 
 // Flushes the folders that can be read; others cannot be flushed either.

@@ -8,7 +8,8 @@
 #include <algorithm>
 #include <cctype>
 #include <cerrno>
-#include <optional>
+#include <mutex>
+#include <set>
 #include <string>
 #include <utility>
 
@@ -38,23 +39,83 @@ bool HasOwnName(const std::string& name, std::string_view prefix) {
                      [](unsigned char c) { return std::isalnum(c) != 0; });
 }
 
-// Opens the mark of a folder that this user made; -1 where there is none. Follows no links.
-int OpenMark(const fs::path& folder) {
+enum class Left { kNothingOfOurs, kAlive, kAbandoned, kOfAnotherUser, kWithoutLocks };
+
+// What a later run finds of a folder that has such a name.
+struct Found {
+  Left left = Left::kNothingOfOurs;
+  int mark = -1;  // descriptor, of a folder of this user
+};
+
+Found LookAtAnothers(const fs::path& folder, int dir) {
   struct stat found {};
+  const bool may_have_mark =
+      dir < 0 ? lstat(folder.c_str(), &found) == 0 && S_ISDIR(found.st_mode) &&
+                    found.st_uid != geteuid()
+              : fstatat(dir, kMark, &found, AT_SYMLINK_NOFOLLOW) == 0 && S_ISREG(found.st_mode);
+  return {.left = may_have_mark ? Left::kOfAnotherUser : Left::kNothingOfOurs};
+}
+
+// Opens the mark and tries to lock it. Follows no links. Removes the folder if this user made it
+// and there is nothing in it.
+Found LookAt(const fs::path& folder) {
   const int dir = open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
   if (dir < 0) {
-    return -1;
+    return errno == EACCES ? LookAtAnothers(folder, dir) : Found();
   }
-  const bool is_ours = fstat(dir, &found) == 0 && found.st_uid == geteuid();
-  int mark = is_ours ? openat(dir, kMark, O_RDWR | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC) : -1;
+  struct stat found {};
+  if (fstat(dir, &found) != 0 || found.st_uid != geteuid()) {
+    const Found anothers = LookAtAnothers(folder, dir);
+    close(dir);
+    return anothers;
+  }
+  int mark = openat(dir, kMark, O_RDWR | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
+  close(dir);
   if (mark >= 0 && (fstat(mark, &found) != 0 || !S_ISREG(found.st_mode))) {
     close(std::exchange(mark, -1));
   }
-  if (is_ours && mark < 0) {
+  if (mark < 0) {
     rmdir(folder.c_str());  // only where it is empty
+    return {};
   }
-  close(dir);
-  return mark;
+  const Lock lock = TryLock(mark);
+  return {lock == Lock::kTaken         ? Left::kAbandoned
+          : lock == Lock::kHeldByOther ? Left::kAlive
+                                       : Left::kWithoutLocks,
+          mark};
+}
+
+bool MayHoldFiles(const fs::path& folder) {
+  std::error_code failed;
+  fs::directory_iterator entry(folder, failed);
+  for (const fs::directory_iterator end; !failed && entry != end; entry.increment(failed)) {
+    if (entry->path().filename() != kMark) {
+      return true;
+    }
+  }
+  return static_cast<bool>(failed);
+}
+
+// Returns true the first time that it is asked about a folder: a program looks into the same place
+// for every file that it writes there.
+bool IsNews(const fs::path& folder) {
+  static std::mutex mutex;
+  static std::set<fs::path> told;
+  const std::lock_guard lock(mutex);
+  return told.insert(folder).second;
+}
+
+void TellOfDoubt(const fs::path& folder, Left left, const NoticeSink& tell) {
+  if ((left == Left::kOfAnotherUser || left == Left::kWithoutLocks) && MayHoldFiles(folder) &&
+      IsNews(folder)) {
+    tell(
+        fmt::format("{}: a run left this folder or still works in it, which cannot be told, "
+                    "because {}; if none works here, look into it for files that you miss, then "
+                    "remove it",
+                    folder.string(),
+                    left == Left::kOfAnotherUser ? "it belongs to another user"
+                                                 : "this disk has no file locks"));
+  }
 }
 
 }  // namespace
@@ -86,7 +147,8 @@ Result<OwnFolder> OwnFolder::Make(const fs::path& parent, std::string_view prefi
               SystemReason(error_number), FolderAdvice(error_number));
 }
 
-std::vector<OwnFolder> OwnFolder::Abandoned(const fs::path& parent, std::string_view prefix) {
+std::vector<OwnFolder> OwnFolder::Abandoned(const fs::path& parent, std::string_view prefix,
+                                            const NoticeSink& tell) {
   std::vector<OwnFolder> abandoned;
   std::error_code ignored;  // what cannot be listed cannot be removed either
   for (fs::directory_iterator entry(parent, ignored), end; !ignored && entry != end;
@@ -94,11 +156,16 @@ std::vector<OwnFolder> OwnFolder::Abandoned(const fs::path& parent, std::string_
     if (!HasOwnName(entry->path().filename().string(), prefix)) {
       continue;
     }
-    const int mark = OpenMark(entry->path());
-    if (mark >= 0 && TryLock(mark) == Lock::kTaken) {
-      abandoned.push_back(OwnFolder(entry->path(), mark));
-    } else if (mark >= 0) {
-      close(mark);
+    const Found found = LookAt(entry->path());
+    if (found.left == Left::kAbandoned) {
+      abandoned.push_back(OwnFolder(entry->path(), found.mark));
+      continue;
+    }
+    if (found.mark >= 0) {
+      close(found.mark);
+    }
+    if (tell) {
+      TellOfDoubt(entry->path(), found.left, tell);
     }
   }
   return abandoned;

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "core/error.h"
+#include "core/notice.h"
 
 namespace sateen {
 
@@ -17,15 +18,18 @@ namespace sateen {
 ///
 ///     process alive            locked, never touched by others
 ///     process killed           Abandoned() gives it to the next run, which removes it
-///     no locks on this disk    never touched by others
+///     no locks on this disk    never touched by others, but named
+///     of another user          never touched by others, but named
 class OwnFolder {
  public:
   // Makes it in `parent`, as `prefix` and six letters or digits. kIo where it cannot be made.
   [[nodiscard]] static Result<OwnFolder> Make(const std::filesystem::path& parent,
                                               std::string_view prefix);
-  // Returns those in `parent` whose process has ended. Removes those that are still empty.
+  // Returns those in `parent` whose process has ended. Removes those that are still empty. `tell`
+  // hears once of each that may hold files and that nobody can know to be abandoned.
   [[nodiscard]] static std::vector<OwnFolder> Abandoned(const std::filesystem::path& parent,
-                                                        std::string_view prefix);
+                                                        std::string_view prefix,
+                                                        const NoticeSink& tell = {});
 
   OwnFolder(OwnFolder&& other) noexcept;
   OwnFolder& operator=(OwnFolder&&) = delete;

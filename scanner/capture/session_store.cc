@@ -8,6 +8,7 @@
 #include "core/files/file_exchange.h"
 #include "core/files/file_io.h"
 #include "core/files/output_folder.h"
+#include "core/notice.h"
 #include "core/sha256.h"
 #include "scanner/capture/own_frames.h"
 #include "scanner/capture/session_folder.h"
@@ -34,7 +35,7 @@ constexpr std::string_view kIncoming = ".sateen-incoming-";
 
 // Removes what a killed capture left hidden.
 void CleanUp(const fs::path& dir) {
-  OwnFolder::Abandoned(dir, kIncoming).clear();
+  OwnFolder::Abandoned(dir, kIncoming, Notice).clear();
   CleanUpAfterKills(dir);
 }
 

@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <sys/syscall.h>
 #include <sys/wait.h>
@@ -19,6 +20,8 @@
 namespace {
 
 bool is_network_disk = false;  // which keeps the entry of a file until the file is closed
+
+bool has_locks = true;  // a disk may have none
 
 bool HasOpenFiles(const std::filesystem::path& folder) {
   for (const auto& descriptor : std::filesystem::directory_iterator("/proc/self/fd")) {
@@ -42,6 +45,14 @@ extern "C" int rmdir(const char* path) {
   return static_cast<int>(syscall(SYS_rmdir, path));
 }
 
+extern "C" int flock(int file, int operation) {
+  if (!has_locks) {
+    errno = ENOLCK;
+    return -1;
+  }
+  return static_cast<int>(syscall(SYS_flock, file, operation));
+}
+
 namespace sateen::own_folder_test {
 namespace {
 
@@ -49,6 +60,7 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::SizeIs;
+using ::testing::StartsWith;
 
 namespace fs = std::filesystem;
 
@@ -72,6 +84,14 @@ class OwnFolderTest : public ::testing::Test {
   }
   [[nodiscard]] std::vector<OwnFolder> Abandoned() const {
     return OwnFolder::Abandoned(temp_.Path(), kPrefix);
+  }
+  // Returns what it says of folders that may be abandoned, and finds none that is.
+  [[nodiscard]] std::vector<std::string> Doubts() const {
+    std::vector<std::string> doubts;
+    EXPECT_THAT(OwnFolder::Abandoned(temp_.Path(), kPrefix,
+                                     [&](const std::string& text) { doubts.push_back(text); }),
+                IsEmpty());
+    return doubts;
   }
 
   const testing::TempFolder temp_;
@@ -125,7 +145,7 @@ TEST_F(OwnFolderTest, OfALivingProcessIsNeverTouched) {
   const OwnFolder alive = OwnFolder::Make(temp_.Path(), kPrefix).value();
   testing::WriteText(alive.Path() / "file", "x");
 
-  EXPECT_THAT(Abandoned(), IsEmpty());
+  EXPECT_THAT(Doubts(), IsEmpty());
 
   EXPECT_TRUE(fs::exists(alive.Path() / "file"));
 }
@@ -163,23 +183,43 @@ TEST_F(OwnFolderTest, WhatOnlyLooksAlikeIsLeftAlone) {
   ASSERT_EQ(mkfifo((temp_.Path() / ".sateen-jjjjjj/.sateen-own").c_str(), 0600), 0);
   const std::vector<std::string> before = testing::Listing(temp_.Path());
 
-  EXPECT_THAT(Abandoned(), IsEmpty());
+  EXPECT_THAT(Doubts(), IsEmpty());
 
   EXPECT_EQ(testing::Listing(temp_.Path()), before);
 }
 
-TEST_F(OwnFolderTest, OfAnotherUserIsLeftAlone) {
+TEST_F(OwnFolderTest, WithoutLocksAFolderOfFilesIsNamedOnceAndLeft) {
+  const fs::path left = LeftByKilledProcess();
+  has_locks = false;
+  const OwnFolder without_files = OwnFolder::Make(temp_.Path(), kPrefix).value();
+
+  const std::vector<std::string> doubts = Doubts();
+  const std::vector<std::string> again = Doubts();
+
+  has_locks = true;
+  ASSERT_THAT(doubts, SizeIs(1));
+  EXPECT_THAT(doubts[0], StartsWith(left.string() + ": a run left this folder or still works in"));
+  EXPECT_THAT(doubts[0], HasSubstr("because this disk has no file locks; if none works here"));
+  EXPECT_THAT(again, IsEmpty());
+  EXPECT_TRUE(fs::exists(left / "deep/file"));
+}
+
+TEST_F(OwnFolderTest, OfAnotherUserIsNamedOnceAndLeft) {
   if (geteuid() != 0) {
     GTEST_SKIP() << "needs root, to give a folder away";
   }
   const fs::path left = LeftByKilledProcess();
   ASSERT_EQ(chown(left.c_str(), 65534, 65534), 0);
-  const fs::path empty = temp_.Path() / ".sateen-aaaaaa";
+  const fs::path empty = temp_.Path() / ".sateen-aaaaaa";  // and without a mark
   ASSERT_TRUE(fs::create_directory(empty));
   ASSERT_EQ(chown(empty.c_str(), 65534, 65534), 0);
 
-  EXPECT_THAT(Abandoned(), IsEmpty());
+  const std::vector<std::string> doubts = Doubts();
 
+  ASSERT_THAT(doubts, SizeIs(1));
+  EXPECT_THAT(doubts[0], StartsWith(left.string() + ": a run left this folder or still works in"));
+  EXPECT_THAT(doubts[0], HasSubstr("because it belongs to another user; if none works here"));
+  EXPECT_THAT(Doubts(), IsEmpty());
   EXPECT_TRUE(fs::exists(left / "deep/file"));
   EXPECT_TRUE(fs::exists(empty));
 }
