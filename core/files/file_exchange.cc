@@ -102,7 +102,7 @@ std::vector<fs::path> FilesBelow(const fs::path& dir) {
        entry.increment(failed)) {
     std::error_code ignored;
     if (!entry->is_directory(ignored) || entry->is_symlink(ignored)) {
-      files.push_back(fs::relative(entry->path(), dir, ignored));
+      files.push_back(entry->path().lexically_relative(dir));  // of a link, not of its target
     }
   }
   return files;

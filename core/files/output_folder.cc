@@ -125,6 +125,11 @@ Error OutputFolder::InPlace(Error error) const {
 
 Status OutputFolder::Commit() {
   SATEEN_CHECK(staging_.has_value());
+  for (const std::string& name : retired_) {
+    if (Status ready = CheckPlace(dir_, name); !ready) {
+      return ready;
+    }
+  }
   for (const std::string& name : names_) {
     const fs::path place = dir_ / name;
     Status ready = CheckPlace(dir_, name)

@@ -35,7 +35,8 @@ class OutputFolder {
   [[nodiscard]] std::filesystem::path Stage(const std::string& name);
   // Stages `name` with `text` as its content.
   [[nodiscard]] Status WriteText(const std::string& name, const std::string& text);
-  // Makes Commit() take away the file `name` of an earlier run, unless it is staged.
+  // Makes Commit() take away the file `name` of an earlier run, unless it is staged. A link or a
+  // folder there makes it fail.
   void Retire(const std::string& name);
   // Returns the error of whoever wrote to a staged place, speaking of the place that the user
   // knows.

@@ -12,6 +12,8 @@
 #include <utility>
 #include <vector>
 
+#include "core/files/file_exchange.h"
+#include "core/files/own_folder.h"
 #include "core/notice.h"
 #include "tests/testing/files.h"
 #include "tests/testing/full_disk.h"
@@ -357,6 +359,57 @@ TEST_F(KilledInCommitTest, WhatHasThePlaceByNowStaysAndTheFormerFileIsNamed) {
   EXPECT_THAT(NextRun(), IsEmpty());
   EXPECT_THAT(Listing(dir_),
               ElementsAre("a.exr", "b", "b/b.exr", "notes.txt", "old.exr", "solve.json"));
+}
+
+// Commit() refuses links, but one may come between.
+TEST_F(KilledInCommitTest, ALinkThatWasMovedAsideIsPutBackAndNotWhatItLeadsTo) {
+  testing::WriteText(temp_.Path() / "far/notes", "mine");
+  fs::create_directories(dir_);
+  fs::create_symlink(temp_.Path() / "far/notes", dir_ / "old.exr");
+  const auto before = testing::Tree(temp_.Path());
+  const OwnFolder staging = OwnFolder::Make(dir_, kStagingPrefix).value();
+  testing::WriteText(staging.Path() / "solve.json", "new");
+  const FileExchange exchange = {staging.Path(), dir_, {"solve.json"}, {"old.exr"}};
+  const pid_t child = fork();
+  if (child == 0) {
+    bool keeps_former = false;
+    renames_left = 1;  // the link is aside
+    _exit(exchange.Run({dir_}, keeps_former) ? 0 : 1);
+  }
+  int status = 0;
+  waitpid(child, &status, 0);
+  ASSERT_EQ(WEXITSTATUS(status), 77);
+  ASSERT_FALSE(fs::is_symlink(dir_ / "old.exr"));
+
+  const ExchangeUndone undone = UndoExchange(staging.Path(), dir_);
+
+  EXPECT_EQ(undone.back, 1U);
+  EXPECT_THAT(undone.kept, IsEmpty());
+  EXPECT_EQ(fs::read_symlink(dir_ / "old.exr"), temp_.Path() / "far/notes");
+  EXPECT_EQ(Text(temp_.Path() / "far/notes"), "mine");
+  fs::remove_all(staging.Path());
+  EXPECT_EQ(testing::Tree(temp_.Path()), before);
+}
+
+TEST_F(OutputFolderTest, WhatIsRetiredMustBeAFile) {
+  testing::WriteText(temp_.Path() / "far", "mine");
+  testing::WriteText(dir_ / "folder.exr/notes", "mine");
+  fs::create_symlink(temp_.Path() / "far", dir_ / "link.exr");
+  const auto before = testing::Tree(temp_.Path());
+  for (const auto& [name, words] :
+       {std::pair("link.exr", "link.exr: is a link where a file must go; move it away"),
+        std::pair("folder.exr", "folder.exr: is a folder where a file must go; move it away")}) {
+    {
+      OutputFolder folder = OutputFolder::Open(dir_).value();
+      ASSERT_TRUE(folder.WriteText("a.exr", "a"));
+      folder.Retire(name);
+      const Status committed = folder.Commit();
+      ASSERT_FALSE(committed);
+      EXPECT_EQ(committed.error().code, ErrorCode::kIo);
+      EXPECT_EQ(committed.error().message, (dir_ / words).string());
+    }
+    EXPECT_EQ(testing::Tree(temp_.Path()), before);
+  }
 }
 
 TEST_F(OutputFolderTest, LinksAndDevicesInTheWayAreRefusedAndLeft) {
