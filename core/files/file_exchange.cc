@@ -78,7 +78,7 @@ struct Listed {
   std::string name;
 };
 
-// Nothing where no list was written whole, so that no file has moved.
+// Nothing where no list was written whole, so that no file has moved, or where all have.
 std::optional<std::vector<Listed>> ReadList(const fs::path& staging) {
   std::istringstream text(ReadFileBytes(staging / kList).value_or(""));
   std::vector<Listed> list;
@@ -93,6 +93,17 @@ std::optional<std::vector<Listed>> ReadList(const fs::path& staging) {
     list.push_back({line.substr(0, blank), line.substr(blank + 1)});
   }
   return std::nullopt;
+}
+
+// Says that the exchange is complete, as one without a list is.
+Status RemoveList(const fs::path& staging) {
+  if (unlink((staging / kList).c_str()) != 0) {
+    return Fail(ErrorCode::kIo, "{}: cannot remove: {}", (staging / kList).string(),
+                SystemReason(errno));
+  }
+  // Where this fails, a loss of power may bring the list back, and the next run the former files.
+  (void)FlushFolders({staging});
+  return {};
 }
 
 std::vector<fs::path> FilesBelow(const fs::path& dir) {
@@ -146,11 +157,13 @@ Status FileExchange::Run(const std::vector<fs::path>& folders, bool& keeps_forme
     return listed;
   }
   Moves moves;
-  Status placed = MoveAll(*this, folders, moves);
+  Status placed = MoveAll(*this, folders, moves).and_then([&] { return RemoveList(staging); });
   if (!placed && !moves.TakeBack()) {  // former files must not go with the staging folder
     keeps_former = true;
-    placed.error().message +=
-        fmt::format("; the files that were there are kept in {}", staging.string());
+    placed.error().message += fmt::format(
+        "; the files that were there are kept in {}, and the next run into this folder "
+        "puts them back",
+        staging.string());
   }
   return placed;
 }
@@ -158,10 +171,7 @@ Status FileExchange::Run(const std::vector<fs::path>& folders, bool& keeps_forme
 ExchangeUndone UndoExchange(const fs::path& staging, const fs::path& dir) {
   ExchangeUndone undone;
   const std::optional<std::vector<Listed>> list = ReadList(staging);
-  const bool is_complete = !list || std::ranges::none_of(*list, [&](const Listed& file) {
-    return IsThere(staging / file.name);
-  });
-  if (is_complete) {  // or not begun
+  if (!list) {
     return undone;
   }
   for (auto file = list->rbegin(); file != list->rend(); ++file) {
@@ -186,13 +196,13 @@ void CleanUpAfterKills(const fs::path& dir) {
     const ExchangeUndone undone = UndoExchange(left.Path(), dir);
     if (undone.back > 0) {
       Notice(
-          fmt::format("{}: an earlier run was killed while it put its files in place; the {} "
+          fmt::format("{}: an earlier run was cut short while it put its files in place; the {} "
                       "files from before it are back",
                       dir.string(), undone.back));
     }
     for (const fs::path& kept : undone.kept) {
       Notice(
-          fmt::format("{}: an earlier run was killed while it put its files in place, and "
+          fmt::format("{}: an earlier run was cut short while it put its files in place, and "
                       "another file has this file's place by now; move it where you need it, "
                       "then remove {}",
                       kept.string(), left.Path().string()));

@@ -16,7 +16,7 @@ inline constexpr std::string_view kStagingPrefix = ".sateen-";
 /// Files in a staging folder that take the places of those in a folder, all of them or none.
 ///
 ///     STAGING/NAME             a new file, flushed to the disk
-///     STAGING/.exchange        the new files, written before the first of them moves
+///     STAGING/.exchange        the new files, from before the first of them moves until all have
 ///     STAGING/.replaced/NAME   a former file, once it has moved aside
 ///
 /// The last of `names` is the record, which describes the others: it leaves first and arrives last.
@@ -27,12 +27,12 @@ struct FileExchange {
   std::vector<std::string> retired;  // former files that go without a new one
 
   /// Fails with kIo, which names the file. Then all is as before, or the message says where the
-  /// former files are, and `keeps_former` is set.
+  /// former files are, and `keeps_former` is set: `staging` must stay for UndoExchange().
   [[nodiscard]] Status Run(const std::vector<std::filesystem::path>& folders,
                            bool& keeps_former) const;
 };
 
-// What became of an exchange in which the process was killed.
+// What became of an exchange in which the process was killed, or which the disk did not let end.
 struct ExchangeUndone {
   std::size_t back = 0;                     // former files that are in their places again
   std::vector<std::filesystem::path> kept;  // former files whose places are taken, in `staging`

@@ -7,6 +7,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <cerrno>
 #include <optional>
 #include <string>
 #include <utility>
@@ -21,7 +22,8 @@
 
 namespace {
 
-int renames_left = -1;  // until the process is killed; below 0: never
+int renames_left = -1;       // until the process is killed; below 0: never
+int renames_that_work = -1;  // until the disk fails; below 0: always
 
 }  // namespace
 
@@ -30,7 +32,20 @@ extern "C" int rename(const char* from, const char* to) {
   if (renames_left-- == 0) {
     _exit(77);
   }
+  if (renames_that_work == 0) {
+    errno = EIO;
+    return -1;
+  }
+  renames_that_work -= renames_that_work > 0 ? 1 : 0;
   return static_cast<int>(syscall(SYS_rename, from, to));
+}
+
+extern "C" int fsync(int file) {
+  if (renames_that_work == 0) {
+    errno = EIO;
+    return -1;
+  }
+  return static_cast<int>(syscall(SYS_fsync, file));
 }
 
 namespace sateen::output_folder_test {
@@ -315,8 +330,9 @@ TEST_F(KilledInCommitTest, NextRunPutsFormerFilesBackFromEveryMove) {
     EXPECT_EQ(testing::Tree(dir_), first) << "after a kill at move " << kills;
     if (kills > 0) {
       ASSERT_THAT(notices, ::testing::SizeIs(1)) << kills;
-      EXPECT_THAT(notices[0], HasSubstr(dir_.string() + ": an earlier run was killed while it put "
-                                                        "its files in place; the "));
+      EXPECT_THAT(notices[0],
+                  HasSubstr(dir_.string() + ": an earlier run was cut short while it put "
+                                            "its files in place; the "));
     }
   }
   EXPECT_EQ(kills, 8);  // four files aside, four in their places
@@ -359,6 +375,28 @@ TEST_F(KilledInCommitTest, WhatHasThePlaceByNowStaysAndTheFormerFileIsNamed) {
   EXPECT_THAT(NextRun(), IsEmpty());
   EXPECT_THAT(Listing(dir_),
               ElementsAre("a.exr", "b", "b/b.exr", "notes.txt", "old.exr", "solve.json"));
+}
+
+// The disk fails at a move, or at the flush after the last one, and stays so until the next run.
+TEST_F(KilledInCommitTest, NextRunPutsBackWhatADiskThatFailsDoesNot) {
+  FirstRun();
+  const auto first = testing::Tree(dir_);
+  for (const int renames : {3, 6, 8}) {
+    renames_that_work = renames;
+    const Status second = SecondRun(dir_);
+    renames_that_work = -1;
+    ASSERT_FALSE(second);
+    const std::string& said = second.error().message;
+    const std::string words = "; the files that were there are kept in ";
+    ASSERT_THAT(said, HasSubstr(words));
+    const size_t begin = said.find(words) + words.size();
+    const fs::path kept = said.substr(begin, said.find(", and the next run", begin) - begin);
+    EXPECT_EQ(Text(kept / ".replaced/solve.json"), "first solve.json") << renames;
+
+    EXPECT_THAT(NextRun(), ::testing::SizeIs(1)) << renames;
+
+    EXPECT_EQ(testing::Tree(dir_), first) << renames;
+  }
 }
 
 // Commit() refuses links, but one may come between.
