@@ -162,6 +162,7 @@ class JournalReader {
       if (!is) {
         return tl::unexpected(is.error());
       }
+      journal_->done_names.insert(is->file);
       done = *std::move(is);
       is_begun_[frame] = false;
     } else if (name == "frame rejected") {

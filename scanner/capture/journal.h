@@ -57,6 +57,8 @@ struct Journal {
   std::vector<std::optional<SessionFrame>> done;  // one for each of the plan
   // Every frame that was ever begun, of earlier plans too: "frames/03-led-2", no extension.
   std::set<std::filesystem::path> begun_names;
+  // Every file that ever was a frame that is done, of earlier plans too: "frames/03-led-2.nef".
+  std::set<std::filesystem::path> done_names;
   int rejected = 0;  // records of it
   bool complete = false;
   // Length of the whole lines. A part of a line beyond them was being written when the power went.

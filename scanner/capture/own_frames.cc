@@ -39,11 +39,21 @@ std::vector<fs::directory_entry> EntriesOf(const fs::path& dir) {
   return entries;
 }
 
-bool IsBegun(const Journal& journal, const fs::directory_entry& entry) {
+// Returns whether the journal knows a file of this name as its own.
+bool HasOwnName(const Journal& journal, const fs::path& name) {
+  if (journal.done_names.contains(kFramesFolder / name.filename())) {
+    return true;
+  }
+  const bool was_done = std::ranges::any_of(
+      journal.done_names, [&](const fs::path& done) { return done.stem() == name.stem(); });
+  return !was_done && journal.begun_names.contains(kFramesFolder / name.stem());
+}
+
+bool IsOwn(const Journal& journal, const fs::directory_entry& entry) {
   std::error_code ignored;
   const fs::path name = entry.path().filename();
   return entry.symlink_status(ignored).type() == fs::file_type::regular && IsRawName(name) &&
-         journal.begun_names.contains(kFramesFolder / name.stem());
+         HasOwnName(journal, name);
 }
 
 bool IsDone(const Journal& journal, const fs::directory_entry& entry) {
@@ -82,9 +92,25 @@ Status CheckFrameName(const fs::path& dir, const Journal& journal, std::size_t f
   return {};
 }
 
+Status CheckFrameFile(const fs::path& dir, const Journal& journal, const fs::path& file) {
+  std::error_code ignored;
+  const fs::file_type there = fs::symlink_status(dir / file, ignored).type();
+  if (there != fs::file_type::not_found && there != fs::file_type::regular) {
+    return Fail(ErrorCode::kInvalidArgument,
+                "{}: is a link or a folder where a frame must go; move it away",
+                (dir / file).string());
+  }
+  if (there == fs::file_type::regular && !HasOwnName(journal, file)) {
+    return Fail(ErrorCode::kInvalidArgument,
+                "{}: is not of this capture and has the place of one of its frames; move it away",
+                (dir / file).string());
+  }
+  return {};
+}
+
 void RemoveFormerFrames(const fs::path& dir, const Journal& journal) {
   for (const fs::directory_entry& entry : EntriesOf(dir)) {
-    if (IsBegun(journal, entry) && !IsDone(journal, entry)) {
+    if (IsOwn(journal, entry) && !IsDone(journal, entry)) {
       std::error_code ignored;  // then it is in nobody's way
       fs::remove(entry.path(), ignored);
     }
@@ -94,7 +120,7 @@ void RemoveFormerFrames(const fs::path& dir, const Journal& journal) {
 void NameOtherFiles(const fs::path& dir, const Journal& journal) {
   std::vector<std::string> names;
   for (const fs::directory_entry& entry : EntriesOf(dir)) {
-    if (!IsBegun(journal, entry)) {
+    if (!IsOwn(journal, entry)) {
       names.push_back(entry.path().filename().string());
     }
   }

@@ -6,8 +6,9 @@
 #include "core/error.h"
 #include "scanner/capture/journal.h"
 
-// A capture removes and replaces files in frames/ only if its journal began a frame of that name.
-// Whatever else is there belongs to someone else, and is named and left.
+// A capture removes and replaces files in frames/ only if its journal has them as frames that are
+// done, or began a frame of that name that was never done: its file may have any ending of camera
+// RAW. Whatever else is there belongs to someone else, and is named and left.
 namespace sateen {
 
 inline constexpr const char* kFramesFolder = "frames";
@@ -20,11 +21,15 @@ inline constexpr const char* kFramesFolder = "frames";
 [[nodiscard]] Status CheckFrameName(const std::filesystem::path& dir, const Journal& journal,
                                     std::size_t frame);
 
-// Removes the files of frames that the journal began and that are not done: those of earlier plans
-// and of tries that were killed.
+// Fails with kInvalidArgument where `file`, "frames/03-led-2.nef", is there and not this capture's.
+[[nodiscard]] Status CheckFrameFile(const std::filesystem::path& dir, const Journal& journal,
+                                    const std::filesystem::path& file);
+
+// Removes the capture's files that are no frame of its plan: those of earlier plans and of tries
+// that were killed.
 void RemoveFormerFrames(const std::filesystem::path& dir, const Journal& journal);
 
-// Tells, in one notice, what lies in frames/ that the journal did not begin.
+// Tells, in one notice, what lies in frames/ that is not the capture's.
 void NameOtherFiles(const std::filesystem::path& dir, const Journal& journal);
 
 }  // namespace sateen

@@ -185,12 +185,6 @@ Status SessionStore::BeginFrame(std::size_t frame) {
 
 Status SessionStore::Place(const fs::path& delivered, const fs::path& place) {
   std::error_code error;
-  const fs::file_type there = fs::symlink_status(place, error).type();
-  if (there != fs::file_type::not_found && there != fs::file_type::regular) {
-    return Fail(ErrorCode::kInvalidArgument,
-                "{}: is a link or a folder where a frame must go; move it away", place.string());
-  }
-  error.clear();
   fs::rename(delivered, place, error);
   if (error) {
     return Fail(ErrorCode::kIo, "{}: cannot move the frame here: {}", place.string(),
@@ -201,9 +195,11 @@ Status SessionStore::Place(const fs::path& delivered, const fs::path& place) {
 }
 
 Status SessionStore::KeepFrame(std::size_t frame, SessionFrame record, const fs::path& delivered) {
-  return Place(delivered, dir_ / record.file)
+  return CheckFrameFile(dir_, journal_, record.file)
+      .and_then([&] { return Place(delivered, dir_ / record.file); })
       .and_then([&] { return writer_.FrameDone(frame, record); })
       .map([&] {
+        journal_.done_names.insert(record.file);
         journal_.done[frame] = std::move(record);
         is_new_[frame] = true;
       });

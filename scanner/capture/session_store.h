@@ -64,6 +64,7 @@ class SessionStore {
   // kInvalidArgument: a file that is not of this capture has the frame's place.
   [[nodiscard]] Status BeginFrame(std::size_t frame);
   // Moves the delivered file to where the record says, and records the frame as done.
+  // kInvalidArgument: another file has the place.
   [[nodiscard]] Status KeepFrame(std::size_t frame, SessionFrame record,
                                  const std::filesystem::path& delivered);
   // Opens a frame that was begun or done again.

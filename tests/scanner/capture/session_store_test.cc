@@ -29,16 +29,20 @@ class SessionStoreTest : public ::testing::Test {
   }
   // Delivers a file and keeps it as the frame.
   static void Keep(SessionStore& store, size_t frame) {
+    ASSERT_TRUE(store.BeginFrame(frame));
+    const Status kept = KeepBegun(store, frame, "DSC.DNG");
+    ASSERT_TRUE(kept) << kept.error().message;
+  }
+  static Status KeepBegun(SessionStore& store, size_t frame, const std::string& name) {
     const std::string text = fmt::format("frame {}", frame);
-    const fs::path delivered = store.Incoming() / fmt::format("{:02}", frame) / "DSC.DNG";
+    const fs::path delivered = store.Incoming() / fmt::format("{:02}", frame) / name;
     testing::WriteText(delivered, text);
     SessionFrame record = store.Record().plan[frame];
     record.file = FileNameOf(frame, record, delivered);
     record.sha256 = Sha256(text);
     record.f_number = 8.0;
     record.iso = 100.0;
-    ASSERT_TRUE(store.BeginFrame(frame));
-    ASSERT_TRUE(store.KeepFrame(frame, record, delivered));
+    return store.KeepFrame(frame, record, delivered);
   }
   static void KeepAll(SessionStore& store) {
     for (const size_t frame : store.Open()) {
@@ -173,6 +177,60 @@ TEST_F(SessionStoreTest, AFrameDoesNotTakeThePlaceOfAnotherFile) {
   EXPECT_THAT(store.KeepFrame(1, record, store.Incoming() / "01/DSC.DNG").error(),
               IsError(ErrorCode::kInvalidArgument, "01-east.dng: is a link or a folder where"));
   EXPECT_EQ(testing::ReadText(temp_.Path() / "far"), "mine");
+}
+
+// A person has converted frames beside them: the stem is the capture's, the file is not.
+TEST_F(SessionStoreTest, AFileBesideAFrameThatWasDoneIsNamedAndLeft) {
+  std::vector<std::string> notices;
+  const NoticesTo here([&](const std::string& text) { notices.push_back(text); });
+  const fs::path frames = dir_ / "frames";
+  {
+    SessionStore store = SessionStore::Begin(dir_, rig_file_, {}).value();
+    ASSERT_TRUE(store.SetPlan(PlanOf(store.GetRig(), {0.1, 0.8}), "found"));
+    KeepAll(store);
+    testing::WriteText(frames / "01-east.nef", "mine");
+    testing::WriteText(frames / "09-east-again.nef", "mine");  // a frame of this plan alone
+  }
+  SessionStore store = SessionStore::Resume(dir_).value();
+  ASSERT_TRUE(store.SetPlan(PlanOf(store.GetRig(), {0.1}), "as asked"));
+  KeepAll(store);
+  testing::WriteText(frames / "02-west.cr2", "mine");
+  ASSERT_TRUE(store.RejectFrame(2, "moved"));
+  Keep(store, 2);
+
+  ASSERT_TRUE(store.Complete(SessionOf(store.Record())));
+
+  EXPECT_THAT(testing::Listing(frames),
+              ElementsAre("00-dark.dng", "01-east.dng", "01-east.nef", "02-west.cr2", "02-west.dng",
+                          "03-north.dng", "04-south.dng", "05-east-again.dng", "06-dark.dng",
+                          "09-east-again.nef"));
+  EXPECT_THAT(notices,
+              ElementsAre(frames.string() + ": 3 entries are not of this capture and left alone: "
+                                            "01-east.nef, 02-west.cr2, 09-east-again.nef"));
+}
+
+TEST_F(SessionStoreTest, AFrameOfAnotherEndingDoesNotTakeThePlaceOfAFileBesideIt) {
+  SessionStore store = Begin();
+  Keep(store, 1);
+  const fs::path beside = dir_ / "frames/01-east.nef";
+  testing::WriteText(beside, "mine");
+  ASSERT_TRUE(store.RejectFrame(1, "too dark"));
+  ASSERT_TRUE(store.BeginFrame(1));
+  EXPECT_THAT(KeepBegun(store, 1, "DSC.NEF").error(),  // from another camera
+              IsError(ErrorCode::kInvalidArgument, beside.string() + ": is not of this capture"));
+  EXPECT_EQ(testing::ReadText(beside), "mine");
+  EXPECT_TRUE(KeepBegun(store, 1, "DSC.DNG"));
+}
+
+TEST_F(SessionStoreTest, BeginningAgainLeavesAFileBesideAFrameThatWasDone) {
+  {
+    SessionStore store = Begin();
+    Keep(store, 0);
+    testing::WriteText(dir_ / "frames/00-dark.nef", "mine");
+    ASSERT_TRUE(store.RejectFrame(0, "not dark"));
+  }
+  SessionStore store = Begin();
+  EXPECT_THAT(testing::Listing(dir_ / "frames"), ElementsAre("00-dark.nef"));
 }
 
 // Killed after the first frame was put in place and before the journal said so.
