@@ -13,6 +13,7 @@
 #include "core/check.h"
 #include "core/files/file_io.h"
 #include "core/json.h"
+#include "core/notice.h"
 #include "scanner/sessions/session_json.h"
 
 namespace sateen {
@@ -198,6 +199,31 @@ nlohmann::ordered_json OfFrame(const char* record, std::size_t frame) {
   return {{"record", record}, {"frame", frame}};
 }
 
+// Locks the journal where the disk can. Some network disks cannot: then a notice says so.
+Status LockJournal(int file, const fs::path& dir) {
+  if (flock(file, LOCK_EX | LOCK_NB) == 0) {
+    return {};
+  }
+  const int error_number = errno;
+  if (error_number == EWOULDBLOCK) {
+    return Fail(ErrorCode::kIo,
+                "{}: another program is capturing into this folder; wait until it has ended, or "
+                "choose another folder",
+                dir.string());
+  }
+  if (error_number == ENOLCK || error_number == EOPNOTSUPP || error_number == ENOSYS) {
+    Notice(
+        fmt::format("{}: this disk has no file locks ({}), so a second program that captures "
+                    "into this folder would not be noticed; let only one do so",
+                    dir.string(), SystemReason(error_number)));
+    return {};
+  }
+  return Fail(ErrorCode::kIo,
+              "{}: cannot be locked: {}; does another program capture into this folder? Else "
+              "choose another folder",
+              (dir / kJournalFile).string(), SystemReason(error_number));
+}
+
 }  // namespace
 
 Result<std::optional<Journal>> ParseJournal(const std::string& text, const std::string& where) {
@@ -243,14 +269,9 @@ Result<JournalWriter> JournalWriter::Open(const fs::path& dir) {
   if (fstat(writer.fd_, &found) != 0 || !S_ISREG(found.st_mode)) {
     return Fail(ErrorCode::kIo, "{}: is a device or a pipe; move it away", writer.path_.string());
   }
-  if (flock(writer.fd_, LOCK_EX | LOCK_NB) != 0) {
-    return Fail(ErrorCode::kIo,
-                "{}: another program is capturing into this folder; wait until it has ended, or "
-                "choose another folder",
-                dir.string());
-  }
-  if (const Status flushed = FlushToDisk(dir, dir); !flushed) {
-    return tl::unexpected(flushed.error());
+  const Status ready = LockJournal(writer.fd_, dir).and_then([&] { return FlushToDisk(dir, dir); });
+  if (!ready) {
+    return tl::unexpected(ready.error());
   }
   return writer;
 }

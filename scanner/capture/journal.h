@@ -77,8 +77,8 @@ struct Journal {
 [[nodiscard]] Result<std::optional<Journal>> ParseJournal(const std::string& text,
                                                           const std::string& where);
 
-/// Appends to journal.jsonl. One program at a time: the file is locked while this lives. After an
-/// append the record is on the disk; after an error the file is as before, and takes nothing more.
+/// Appends to journal.jsonl. One program at a time: the file is locked while this lives. On a disk
+/// without file locks a notice asks for that. After an append the record is on the disk; after an error the file is as before, and takes nothing more.
 ///
 /// Errors   kIo: the file cannot be written or flushed; another program captures into this folder
 class JournalWriter {

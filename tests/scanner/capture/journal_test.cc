@@ -1,11 +1,32 @@
 #include "scanner/capture/journal.h"
 
 #include <gmock/gmock.h>
+#include <sys/file.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+
+#include <cerrno>
 
 #include "core/files/file_io.h"
+#include "core/notice.h"
 #include "tests/scanner/sessions/dataset_files.h"
 #include "tests/testing/files.h"
 #include "tests/testing/full_disk.h"
+
+namespace {
+
+int lock_error = 0;  // errno of every lock; 0: the disk has locks
+
+}  // namespace
+
+// Replaced in this program alone.
+extern "C" int flock(int file, int operation) {
+  if (lock_error != 0) {
+    errno = lock_error;
+    return -1;
+  }
+  return static_cast<int>(syscall(SYS_flock, file, operation));
+}
 
 namespace sateen::journal_test {
 namespace {
@@ -241,6 +262,35 @@ TEST(Journal, HasOneWriterAtATime) {
   const Result<JournalWriter> second = JournalWriter::Open(temp.Path());
   ASSERT_FALSE(second);
   EXPECT_THAT(second.error(), IsError(ErrorCode::kIo, "another program is capturing"));
+}
+
+TEST(Journal, IsWrittenWithoutALockWhereTheDiskHasNone) {
+  const TempFolder temp;
+  std::vector<std::string> notices;
+  const NoticesTo here([&](const std::string& text) { notices.push_back(text); });
+  for (const int reason : {ENOLCK, EOPNOTSUPP, ENOSYS}) {
+    notices.clear();
+    lock_error = reason;
+    Result<JournalWriter> writer = JournalWriter::Open(temp.Path());
+    lock_error = 0;
+    ASSERT_TRUE(writer) << writer.error().message;
+    EXPECT_TRUE(writer->Begin(Begun()));
+    ASSERT_EQ(notices.size(), 1U);
+    EXPECT_THAT(notices[0], HasSubstr(temp.Path().string() + ": this disk has no file locks"));
+    EXPECT_THAT(notices[0], HasSubstr("let only one do so"));
+  }
+}
+
+TEST(Journal, NamesTheReasonWhyItCannotBeLocked) {
+  const TempFolder temp;
+  for (const int reason : {EIO, EACCES}) {  // a conflict may be EACCES on a Windows share
+    lock_error = reason;
+    const Result<JournalWriter> writer = JournalWriter::Open(temp.Path());
+    lock_error = 0;
+    ASSERT_FALSE(writer);
+    EXPECT_THAT(writer.error(), IsError(ErrorCode::kIo, "journal.jsonl: cannot be locked: " +
+                                                            SystemReason(reason)));
+  }
 }
 
 TEST(Journal, AFullDiskLeavesTheRecordsBefore) {
