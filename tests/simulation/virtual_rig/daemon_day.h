@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
@@ -16,23 +17,19 @@ struct Usage {
   long memory_kb = 0;
   long descriptors = 0;
   long threads = 0;
-  long scratch_files = 0;  // in the folder for temporary files, of this process
+  long scratch_files = 0;  // in the folder for temporary files
 };
 
-inline long EntriesOf(const std::filesystem::path& folder, const std::string& with = "") {
-  long count = 0;
+inline long EntriesOf(const std::filesystem::path& folder) {
   std::error_code ignored;
-  for (const auto& entry : std::filesystem::directory_iterator(folder, ignored)) {
-    count += entry.path().filename().string().find(with) == std::string::npos ? 0 : 1;
-  }
-  return count;
+  const std::filesystem::directory_iterator entries(folder, ignored);
+  return std::distance(begin(entries), end(entries));
 }
 
-inline Usage UsageNow() {
+inline Usage UsageNow(const StressedDaemon& daemon) {
   Usage usage = {.descriptors = EntriesOf("/proc/self/fd"),
                  .threads = EntriesOf("/proc/self/task"),
-                 .scratch_files = EntriesOf(std::filesystem::temp_directory_path(),
-                                            fmt::format("-{}-", getpid()))};
+                 .scratch_files = EntriesOf(daemon.scratch.Path())};
   std::ifstream status("/proc/self/status");
   for (std::string word; status >> word;) {
     if (word == "VmRSS:") {

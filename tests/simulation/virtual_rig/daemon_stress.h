@@ -5,10 +5,12 @@
 #include <atomic>
 #include <bit>
 #include <chrono>
+#include <cstdlib>
 #include <map>
 #include <memory>
 #include <mutex>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <random>
 #include <string>
 #include <thread>
@@ -58,6 +60,32 @@ class PinWitness {
   std::atomic<int> without_job_ = 0;
 };
 
+// Has the folder for temporary files to itself as long as this lives: what is found in it has been
+// left there. It changes the environment, so it comes before other threads and goes after them.
+class PrivateTempDir {
+ public:
+  PrivateTempDir() { setenv("TMPDIR", folder_.Path().c_str(), 1); }
+  PrivateTempDir(const PrivateTempDir&) = delete;
+  PrivateTempDir& operator=(const PrivateTempDir&) = delete;
+  ~PrivateTempDir() {
+    if (former_) {
+      setenv("TMPDIR", former_->c_str(), 1);
+    } else {
+      unsetenv("TMPDIR");
+    }
+  }
+  [[nodiscard]] const std::filesystem::path& Path() const { return folder_.Path(); }
+
+ private:
+  static std::optional<std::string> Former() {
+    const char* former = std::getenv("TMPDIR");
+    return former == nullptr ? std::nullopt : std::optional<std::string>(former);
+  }
+
+  std::optional<std::string> former_ = Former();
+  TempFolder folder_;
+};
+
 // Lives as long as the daemon; the board and the witness are used by the job's thread.
 struct StressedDaemon {
   explicit StressedDaemon(const HttpServerOptions& options) {
@@ -76,6 +104,7 @@ struct StressedDaemon {
   ~StressedDaemon() { service.Stop(); }  // while the witness still looks
 
   TempFolder folder;
+  PrivateTempDir scratch;
   std::filesystem::path socket = folder.Path() / "s.sock";
   std::filesystem::path rig_file = folder.Path() / "rig.json";
   std::string token = "0123456789abcdef0123456789abcdef";

@@ -1,5 +1,6 @@
 #include <gmock/gmock.h>
 
+#include "core/files/own_folder.h"
 #include "scanner/capture/session_proof.h"
 #include "scanner/daemon/rig_jobs.h"
 #include "tests/simulation/virtual_rig/daemon_day.h"
@@ -46,14 +47,24 @@ TEST(DaemonDay, UsesNoMoreAfterManySessionsThanAfterAFew) {
     for (int k = 0; k < sessions; ++k) {
       EXPECT_THAT(day.LiveOneSession(/*solve=*/k % 5 == 0), IsEmpty());
     }
-    return UsageNow();
+    return UsageNow(daemon);
   };
   const Usage early = live(10);
   const Usage late = live(20);
   EXPECT_LE(late.descriptors, early.descriptors + 2);  // the last connections may still be there
   EXPECT_LE(late.threads, early.threads + 2);
-  EXPECT_EQ(late.scratch_files, early.scratch_files);
+  EXPECT_EQ(early.scratch_files, 0);
+  EXPECT_EQ(late.scratch_files, 0);
   EXPECT_EQ(EntriesOf(daemon.folder.Path()), 3);  // rig, socket and its lock
+}
+
+// A scratch folder that a preview leaves would be counted.
+TEST(DaemonDay, CountsScratchFoldersThatAreThere) {
+  const StressedDaemon daemon({});
+  EXPECT_EQ(UsageNow(daemon).scratch_files, 0);
+  const Result<OwnFolder> scratch = MakeScratchFolder("preview");
+  ASSERT_TRUE(scratch) << scratch.error().message;
+  EXPECT_EQ(UsageNow(daemon).scratch_files, 1);
 }
 
 TEST(Daemon, ACaptureByTheApiIsWholeAndTellsHowFarItIs) {
