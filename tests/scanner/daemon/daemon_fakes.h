@@ -65,7 +65,7 @@ inline JobRequest WorkJob(JobWork work, std::string owner = "alice") {
   return {.kind = "test", .what = "nothing", .owner = std::move(owner), .work = std::move(work)};
 }
 
-// All events of a job, once it has ended.
+// All events of a job, once it has ended; those that there are if no more come for kLong.
 inline std::vector<JobEvent> AllEvents(const RigService& service, std::uint64_t id) {
   std::vector<JobEvent> events;
   while (true) {
@@ -74,7 +74,7 @@ inline std::vector<JobEvent> AllEvents(const RigService& service, std::uint64_t 
       return events;
     }
     events.insert(events.end(), followed->events.begin(), followed->events.end());
-    if (followed->ended) {
+    if (followed->ended || followed->events.empty()) {
       return events;
     }
   }
