@@ -305,9 +305,12 @@ ApiResponse Api::PostPreview(const ApiRequest& request, Parameter /*none*/) cons
     return *std::move(refused);
   }
   const auto jpeg = std::make_shared<std::string>();
-  ApiResponse response = RunToEnd(request, PreviewJob(posted->request, posted->output, jpeg,
-                                                      OwnerName(posted->client, request.who)));
-  if (!jpeg->empty()) {
+  const auto ended = service_.RunToEnd(
+      PreviewJob(posted->request, posted->output, jpeg, OwnerName(posted->client, request.who)),
+      request.client_left);
+  ApiResponse response = Ended(ended);
+  // Without its client the job is left running, and the picture is its own.
+  if (ended && ended->state == JobState::kDone && !jpeg->empty()) {
     response.body = std::move(*jpeg);
     response.content_type = "image/jpeg";
   }

@@ -4,7 +4,9 @@
 
 #include <nlohmann/json.hpp>
 #include <random>
+#include <thread>
 
+#include "imaging/dng.h"
 #include "scanner/daemon/api_json.h"
 #include "scanner/daemon/device_list.h"
 #include "simulation/rigs.h"
@@ -20,6 +22,65 @@ using testing::FakeDaemon;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using testing::kLong;
+
+// A rig for one preview, whose camera delivers a frame when it is let.
+class PreviewRig {
+ public:
+  std::unique_ptr<RigDevices> Devices() {
+    return std::make_unique<RigDevices>(std::make_unique<Port>(*this),
+                                        std::make_unique<Camera>(*this));
+  }
+  [[nodiscard]] bool Exposes() const { return exposes_; }
+  void LetDeliver() { may_deliver_ = true; }
+  // Waits until the job has made its picture and only its end is missing.
+  void AwaitPicture() const {
+    while (!finished_) {
+      std::this_thread::yield();
+    }
+  }
+
+ private:
+  class Camera : public testing::FakeCamera {
+   public:
+    explicit Camera(PreviewRig& rig) : rig_(rig) {}
+    Result<CapturedFile> Capture(const std::filesystem::path& folder,
+                                 milliseconds /*deadline*/) override {
+      rig_.exposes_ = true;
+      while (!rig_.may_deliver_) {
+        std::this_thread::yield();
+      }
+      const std::filesystem::path path = folder / "frame.dng";
+      EXPECT_TRUE(WriteDng(path, Image<uint16_t>(96, 64, 20'000), {}));
+      rig_.frame_ = path;
+      rig_.delivered_ = true;
+      return CapturedFile{.path = path, .name_on_camera = "frame.dng"};
+    }
+
+   private:
+    PreviewRig& rig_;
+  };
+  // The first command after the frame has been removed turns the lights off after the job.
+  class Port : public testing::FakePort {
+   public:
+    explicit Port(PreviewRig& rig) : FakePort(rig.board_), rig_(rig) {}
+    [[nodiscard]] Status Write(std::span<const std::uint8_t> bytes) override {
+      if (rig_.delivered_ && !std::filesystem::exists(rig_.frame_)) {
+        rig_.finished_ = true;
+      }
+      return FakePort::Write(bytes);
+    }
+
+   private:
+    PreviewRig& rig_;
+  };
+
+  testing::FakeBoard board_;
+  std::filesystem::path frame_;  // read once `delivered_` is set
+  std::atomic<bool> exposes_ = false;
+  std::atomic<bool> may_deliver_ = false;
+  std::atomic<bool> delivered_ = false;
+  std::atomic<bool> finished_ = false;
+};
 
 json Body(const ApiResponse& response) { return json::parse(response.body); }
 
@@ -339,6 +400,38 @@ TEST(Api, ALightThatTheBoardHasNotIsRefusedByAnIdleDaemon) {
   FakeDaemon daemon;
   EXPECT_EQ(daemon.Ask("POST", "/v1/lights/14").status, 400);
   EXPECT_TRUE(daemon.rig.board.lights_set.empty());
+}
+
+TEST(Api, APreviewIsThePicture) {
+  PreviewRig rig;
+  RigService service(rig.Devices());
+  const Api api(service, {});
+  rig.LetDeliver();
+  const ApiResponse answer =
+      api.Handle({.method = "POST", .path = "/v1/preview", .body = R"({"exposure_s": 0.02})"});
+  EXPECT_EQ(answer.status, 200) << answer.body;
+  EXPECT_EQ(answer.content_type, "image/jpeg");
+  EXPECT_THAT(answer.body, ::testing::StartsWith("\xff\xd8"));
+}
+
+// The client leaves when the picture is there and its job has not ended: it may still be written.
+TEST(Api, ThePictureOfAJobThatRunsIsNotTouched) {
+  PreviewRig rig;
+  RigService service(rig.Devices());
+  const Api api(service, {});
+  const auto client_left = [&] {
+    if (rig.Exposes()) {
+      rig.LetDeliver();
+      rig.AwaitPicture();
+    }
+    return rig.Exposes();
+  };
+  const ApiResponse answer = api.Handle({.method = "POST",
+                                         .path = "/v1/preview",
+                                         .body = R"({"exposure_s": 0.02})",
+                                         .client_left = client_left});
+  EXPECT_EQ(answer.content_type, "application/json");
+  EXPECT_EQ(answer.body, "");
 }
 
 TEST(Api, ADryRunTellsWhatACaptureWouldDo) {
