@@ -283,13 +283,13 @@ ApiResponse Api::PostLightsOff(const ApiRequest& request, Parameter /*none*/) co
         std::chrono::duration_cast<milliseconds>(deadline - std::chrono::steady_clock::now());
     const JobWait wait = service_.AwaitEnd(id, std::clamp(left, milliseconds(0), kAskAgain));
     const JobRecord job = service_.Find(id).value_or(JobRecord{.id = id, .state = JobState::kDone});
-    if (wait == JobWait::kBoardLost) {
-      return Refused(503, {ErrorCode::kDevice, service_.State().lights_fault});
+    if (wait.end == WaitEnd::kBoardLost) {
+      return Refused(503, {ErrorCode::kDevice, wait.lights_fault});
     }
-    if (wait == JobWait::kRunning && left <= kAskAgain) {
+    if (wait.end == WaitEnd::kRunning && left <= kAskAgain) {
       return {.status = 202, .body = JobJson(job)};
     }
-    if (wait == JobWait::kEnded && off) {
+    if (wait.end == WaitEnd::kEnded && off) {
       return Ended(job);
     }
   }

@@ -250,7 +250,11 @@ JobWait RigService::Impl::AwaitEnd(std::uint64_t id, std::chrono::milliseconds l
     return job != nullptr && job->record.state == JobState::kRunning;
   };
   changed_.wait_for(lock, longest, [&] { return !is_running() || board_lost_; });
-  return !is_running() ? JobWait::kEnded : board_lost_ ? JobWait::kBoardLost : JobWait::kRunning;
+  if (!is_running()) {
+    return {.end = WaitEnd::kEnded};
+  }
+  return board_lost_ ? JobWait{.end = WaitEnd::kBoardLost, .lights_fault = lights_fault_}
+                     : JobWait{.end = WaitEnd::kRunning};
 }
 
 void RigService::Impl::Stop() {

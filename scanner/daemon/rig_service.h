@@ -39,10 +39,16 @@ struct RigState {
   std::string lights_fault;  // why the board's word that all is off is missing; else empty
 };
 
-enum class JobWait {
+// How a wait for the end of a job ended.
+enum class WaitEnd {
   kEnded,
   kBoardLost,  // the job's lights are to be off, and the board does not confirm it so far
   kRunning,
+};
+
+struct JobWait {
+  WaitEnd end = WaitEnd::kRunning;
+  std::string lights_fault;  // why the board has not confirmed; only of kBoardLost
 };
 
 struct FollowedEvents {

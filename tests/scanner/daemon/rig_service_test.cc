@@ -97,6 +97,25 @@ TEST(RigService, AJobThatLosesTheBoardIsReportedUntilTheBoardHasConfirmed) {
   EXPECT_EQ(daemon.service.State().board->firmware, "fakefake");
 }
 
+// With the wait itself: the board may be back before anybody asks for the state.
+TEST(RigService, AWaitThatALostBoardEndsSaysWhy) {
+  FakeDaemon daemon;
+  const std::uint64_t job =
+      *daemon.service.Begin(WorkJob([&](JobContext& context) -> Result<std::string> {
+        EXPECT_TRUE((*context.Devices().Board())->SetLight(2, 0.5, std::chrono::seconds(10)));
+        daemon.rig.board.Unplug();  // the port's clock stands still: it is waited for without end
+        return "{}";
+      }));
+  const JobWait lost = daemon.service.AwaitEnd(job, kLong);
+  EXPECT_EQ(lost.end, WaitEnd::kBoardLost);
+  EXPECT_THAT(lost.lights_fault, HasSubstr("did not confirm"));
+  daemon.rig.held = false;
+  ASSERT_TRUE(daemon.service.WaitIdle(kLong));
+  const JobWait ended = daemon.service.AwaitEnd(job, kLong);
+  EXPECT_EQ(ended.end, WaitEnd::kEnded);
+  EXPECT_EQ(ended.lights_fault, "");
+}
+
 // A preview tells of nothing before it ends, and yet has lit a light.
 TEST(RigService, AFirstJobThatReportsNothingAndLosesTheBoardIsAFault) {
   FakeDaemon daemon;
