@@ -14,8 +14,8 @@ namespace sateen {
 class FileDesk {
  public:
   struct Options {
-    // Longest wait for one reading.
-    std::chrono::milliseconds patience{5000};
+    // Longest wait for one reading: twice what a disk that spins up or an automount takes.
+    std::chrono::milliseconds patience{20'000};
     // Readings that may hang at once.
     int most = 16;
   };

@@ -72,6 +72,12 @@ TEST(FileDesk, AReadingThatHangsIsLeftToItself) {
   EXPECT_THAT(full.error().message, HasSubstr("2 readings of files hang"));
 }
 
+// A disk that sleeps is there all the same.
+TEST(FileDesk, WaitsForDisksThatSpinUp) {
+  constexpr seconds kSlowSpinUp{10};
+  EXPECT_GE(FileDesk::Options().patience, 2 * kSlowSpinUp);
+}
+
 TEST(FileDesk, AReadingThatComesBackMakesRoom) {
   const FileDesk desk({.patience = milliseconds(20), .most = 1});
   {
