@@ -20,11 +20,10 @@ using testing::Exchange;
 using ::testing::HasSubstr;
 using testing::HttpRequest;
 using ::testing::IsEmpty;
+using testing::kSoon;
 using testing::RawClient;
 using testing::StatusOf;
 
-// The promise is 1 s. bench/daemon_bench.cc prints what it takes; this machine may be busy.
-constexpr seconds kSoon{10};
 constexpr int kMore = 70;  // than the 64 connections that there are
 
 class HostileClientsTest : public ::testing::Test {
