@@ -122,7 +122,7 @@ tsan: setup  ## The tests of the daemon and the capture under the thread sanitiz
 	    TSAN_OPTIONS="suppressions=$(CURDIR)/tests/tsan.supp" $(CTEST) --test-dir build/tsan \
 	        -R "(^|/)$$module/" -E solve_job || exit 1; done
 
-kills: setup  ## kill -9 capture, resume, solve, simulate and calibrate at KILLS system calls each; 0: at all
+kills: setup  ## kill -9 capture, resume, solve, simulate and calibrate at KILLS system calls each; 0: at every one
 	@cmake --preset $(PRESET) --log-level=WARNING
 	@cmake --build --preset $(PRESET) -j$(JOBS) --target sateen_virtual_rig_test
 	@SATEEN_KILLS=$(KILLS) build/release/bin/sateen_virtual_rig_test --gtest_filter='ProgramKill.*'

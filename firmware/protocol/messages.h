@@ -75,7 +75,8 @@
   F(u8, max_lit, "1 ... channels", "lights that may be on together")                               \
   F(u8, dim_clock, "0, 1, 2", "frequency of the dimming line: 16 kHz, 2 kHz, 250 Hz")              \
   F(u8, sync_edge, "0, 1", "edge of the flash-sync input that fires: 0 falling, 1 rising")         \
-  F(u16, silence_ms, "1000 ... 2000 ms", "without a good frame so long everything is turned off")  \
+  F(u16, silence_ms, "1000 ... 2000 ms",                                                           \
+    "after this long without a good frame everything is turned off")                               \
   F(u8, reset_cause, "bits", "why the board last started (table below)")                           \
   F(u8, fault, "fault number", "the latest fault that was not cleared, 0 for none")                \
   A(u8, build_id, SATEEN_BUILD_ID_SIZE, "ASCII", "start of the SHA-256 of the firmware's sources") \
