@@ -11,6 +11,8 @@ struct Notices {
   NoticeSink sink;
 };
 
+thread_local const NoticeSink* sink_of_thread = nullptr;
+
 Notices& TheNotices() {
   static Notices notices;
   return notices;
@@ -28,7 +30,15 @@ NoticesTo::~NoticesTo() {
   TheNotices().sink = std::move(former_);
 }
 
+NoticesOfThread::NoticesOfThread(NoticeSink sink)
+    : sink_(std::move(sink)), former_(std::exchange(sink_of_thread, &sink_)) {}
+
+NoticesOfThread::~NoticesOfThread() { sink_of_thread = former_; }
+
 void Notice(const std::string& text) {
+  if (sink_of_thread != nullptr) {
+    (*sink_of_thread)(text);
+  }
   const std::lock_guard lock(TheNotices().mutex);
   if (TheNotices().sink) {
     TheNotices().sink(text);

@@ -21,6 +21,20 @@ class NoticesTo {
   NoticeSink former_;
 };
 
+// Hands the notices of the thread that makes this to `sink`, too, as long as this lives. For work
+// that somebody waits for, beside other work whose notices are not theirs.
+class NoticesOfThread {
+ public:
+  explicit NoticesOfThread(NoticeSink sink);
+  NoticesOfThread(const NoticesOfThread&) = delete;
+  NoticesOfThread& operator=(const NoticesOfThread&) = delete;
+  ~NoticesOfThread();
+
+ private:
+  NoticeSink sink_;
+  const NoticeSink* former_;
+};
+
 void Notice(const std::string& text);
 
 }  // namespace sateen

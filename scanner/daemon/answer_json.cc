@@ -178,6 +178,18 @@ Error ErrorFromJson(const std::string& text) {
           fmt::format("{}: an error was expected, but it says '{}'", kAnswer, text.substr(0, 200))};
 }
 
+std::string NoteJson(const std::string& text) { return OneLine({{"text", text}}); }
+
+Result<std::string> NoteFromJson(const std::string& text) {
+  const Result<nlohmann::json> parsed = ParseAnswer(text);
+  if (!parsed) {
+    return tl::unexpected(parsed.error());
+  }
+  JsonReader json(*parsed, std::string(kAnswer));
+  std::string note = json.String("text");
+  return Answered(json, std::move(note));
+}
+
 std::string EventJson(const CaptureEvent& event) {
   ordered_json json = {{"stage", event.stage},           {"done", event.done},
                        {"frames", event.frames},         {"light", event.light},

@@ -34,6 +34,10 @@ namespace sateen {
 // Returns "the rig is in use: capture of scans/twill by ... since 06:31:07 (job 7); ..."
 [[nodiscard]] std::string BusyText(const JobRecord& holder);
 
+// Writes {"text": ...}: what is neither result nor error of a job, as core/notice.h has it.
+[[nodiscard]] std::string NoteJson(const std::string& text);
+[[nodiscard]] Result<std::string> NoteFromJson(const std::string& text);
+
 [[nodiscard]] std::string EventJson(const CaptureEvent& event);
 [[nodiscard]] Result<CaptureEvent> CaptureEventFromJson(const std::string& text);
 // Writes the summary without the session, which is on disk in session.json.

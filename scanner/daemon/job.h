@@ -21,7 +21,7 @@ inline constexpr std::chrono::milliseconds kLookForClient{100};
 // Event of a job. Events are in order, and a job ends with one "done" or one "failed".
 struct JobEvent {
   std::uint64_t sequence = 0;  // from 1, without gaps
-  std::string type;            // "progress", "done", "failed"
+  std::string type;            // "progress", "note", "done", "failed"
   std::string data;            // one line of JSON
 };
 

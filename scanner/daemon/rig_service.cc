@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "core/check.h"
+#include "core/notice.h"
 #include "core/stray_thread.h"
 #include "scanner/daemon/answer_json.h"
 
@@ -315,6 +316,10 @@ void RigService::Impl::RunJobs(Lane& lane) {
 
 Result<std::string> RigService::Impl::Work(Job& job) {
   Context context(*this, job);
+  const NoticesOfThread notes([&](const std::string& text) {
+    const std::lock_guard lock(mutex_);
+    Append(job, "note", NoteJson(text));
+  });
   // Nothing that a job does may end the daemon, or leave its lights on.
   try {
     const JobWork work = std::exchange(job.work, nullptr);  // released with the job

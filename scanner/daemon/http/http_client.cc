@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/notice.h"
 #include "scanner/daemon/answer_json.h"
 #include "scanner/daemon/api_json.h"
 #include "scanner/daemon/http/event_parser.h"
@@ -98,6 +99,8 @@ class Follower {
     } else if (event.type == "failed") {
       outcome_ = tl::unexpected(ErrorFromJson(event.data));
       complete_ = true;
+    } else if (event.type == "note") {
+      Notice(NoteFromJson(event.data).value_or(event.data));
     } else if (observer_) {
       observer_(event);
     }

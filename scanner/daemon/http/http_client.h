@@ -29,8 +29,8 @@ class DaemonClient {
   [[nodiscard]] Result<std::string> Ask(const std::string& method, const std::string& path,
                                         const std::string& body = "") const;
 
-  // Posts the job, tells `observer` of its progress, cancels it when the task is cancelled or it
-  // cannot be followed, and waits for its end. Returns its result.
+  // Posts the job, tells `observer` of its progress, repeats its notes as notices, cancels it when
+  // the task is cancelled or it cannot be followed, and waits for its end. Returns its result.
   [[nodiscard]] Result<std::string> RunJob(const std::string& path, const std::string& body,
                                            const std::function<void(const JobEvent&)>& observer,
                                            const Task& task) const;

@@ -4,6 +4,7 @@
 
 #include <stdexcept>
 
+#include "core/notice.h"
 #include "tests/scanner/daemon/daemon_fakes.h"
 
 namespace sateen::rig_service_test {
@@ -135,6 +136,44 @@ TEST(RigService, WithoutABoardNothingIsWrongWithTheLights) {
       WorkJob([](JobContext& /*job*/) -> Result<std::string> { return "{}"; }));
   ASSERT_TRUE(ended.has_value());
   EXPECT_EQ(daemon.service.State().lights_fault, "");
+}
+
+// Two jobs at once: each has its own, and the daemon's log has all.
+TEST(RigService, WhatAJobNoticesIsAmongItsEvents) {
+  std::vector<std::string> log;
+  const NoticesTo here([&](const std::string& text) { log.push_back(text); });
+  FakeDaemon daemon;
+  std::atomic<bool> desk_noticed = false;
+  std::atomic<bool> rig_noticed = false;
+  const auto await = [](const std::atomic<bool>& flag) {
+    while (!flag) {
+      std::this_thread::yield();
+    }
+  };
+  const auto rig = daemon.service.Begin(WorkJob([&](JobContext& job) -> Result<std::string> {
+    await(desk_noticed);
+    job.Report("1");
+    Notice("'a \"file\"' is not ours");
+    rig_noticed = true;
+    return "2";
+  }));
+  JobRequest beside = WorkJob([&](JobContext& /*job*/) -> Result<std::string> {
+    Notice("files are back");
+    desk_noticed = true;
+    await(rig_noticed);
+    return "3";
+  });
+  beside.needs_rig = false;
+  const auto desk = daemon.service.Begin(std::move(beside));
+  const std::vector<JobEvent> of_rig = AllEvents(daemon.service, *rig);
+  const std::vector<JobEvent> of_desk = AllEvents(daemon.service, *desk);
+  ASSERT_THAT(of_rig, SizeIs(3));
+  EXPECT_EQ(of_rig[1].type, "note");
+  EXPECT_EQ(*NoteFromJson(of_rig[1].data), "'a \"file\"' is not ours");
+  ASSERT_THAT(of_desk, SizeIs(2));
+  EXPECT_EQ(of_desk[0].type, "note");
+  EXPECT_EQ(*NoteFromJson(of_desk[0].data), "files are back");
+  EXPECT_THAT(log, ::testing::ElementsAre("files are back", "'a \"file\"' is not ours"));
 }
 
 TEST(RigService, EventsAreFollowedFromAnyPlace) {

@@ -1,7 +1,9 @@
 #include <gmock/gmock.h>
 
 #include "core/files/own_folder.h"
+#include "core/notice.h"
 #include "scanner/capture/session_proof.h"
+#include "scanner/daemon/http/http_client.h"
 #include "scanner/daemon/rig_jobs.h"
 #include "tests/simulation/virtual_rig/daemon_day.h"
 
@@ -81,6 +83,33 @@ TEST(Daemon, ACaptureByTheApiIsWholeAndTellsHowFarItIs) {
   EXPECT_THAT(events, ::testing::HasSubstr("event: done\ndata: {\"taken\":13,\"kept\":0"));
   EXPECT_THAT(daemon.witness.Lit(), 0U);
   EXPECT_EQ(*VerifySession(dir, {}), 14);
+}
+
+// A file of another lies among the frames.
+TEST(Daemon, WhatACaptureNoticesReachesWhoAskedForIt) {
+  const TempFolder folder;
+  const std::filesystem::path dir = folder.Path() / "twill";
+  const std::filesystem::path socket = folder.Path() / "s.sock";
+  const Rig rig = CaptureRig();
+  WriteText(folder.Path() / "rig.json", RigToJson(rig));
+  const auto board = *VirtualBoard::Load(Firmware());
+  auto camera = std::make_unique<LitCamera>(*board, LightImages(rig));
+  camera->on_exposed = [&](int /*capture*/) { WriteText(dir / "frames/notes.txt", "mine"); };
+  RigService service(
+      std::make_unique<RigDevices>(std::make_unique<SimulatedPort>(*board), std::move(camera)));
+  const Api api(service, {.capture = QuickCapture()});
+  const HttpServer server(*Listener::OnUnixSocket(socket), api, service, std::nullopt);
+  std::vector<std::string> notes;
+  const NoticesTo here([&](const std::string& text) { notes.push_back(text); });
+
+  const Result<CaptureSummary> summary = CaptureByDaemon(
+      DaemonClient(socket),
+      {.rig = folder.Path() / "rig.json", .output = dir, .options = QuickCapture()}, {});
+
+  ASSERT_TRUE(summary) << summary.error().message;
+  ASSERT_EQ(notes.size(), 2U);  // as the daemon's log has it, and as the command prints it
+  EXPECT_THAT(notes[0], ::testing::HasSubstr("not of this capture and left alone: notes.txt"));
+  EXPECT_EQ(notes[1], notes[0]);
 }
 
 // Cancelled in the middle of a capture: off, and the session can be continued.
