@@ -47,7 +47,8 @@ class FrameTaker {
   FrameTaker(LightBoard& board, TetheredCamera& camera, const FrameSettings& settings,
              const CaptureOptions& options, const Task& task);
 
-  /// Takes a frame into `folder`, which is removed first, with all in it, and made again. No light: a dark frame.
+  /// Takes a frame into `folder`, which is removed first, with all in it, and made again. No light:
+  /// a dark frame.
   ///
   /// Errors   as TetheredCamera::Configure() and ExposeLit()
   [[nodiscard]] Result<TakenFrame> Take(const std::optional<Light>& light, double exposure_s,

@@ -78,7 +78,8 @@ struct Journal {
                                                           const std::string& where);
 
 /// Appends to journal.jsonl. One program at a time: the file is locked while this lives. On a disk
-/// without file locks a notice asks for that. After an append the record is on the disk; after an error the file is as before, and takes nothing more.
+/// without file locks a notice asks for that. After an append the record is on the disk; after an
+/// error the file is as before, and takes nothing more.
 ///
 /// Errors   kIo: the file cannot be written or flushed; another program captures into this folder
 class JournalWriter {
