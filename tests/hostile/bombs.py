@@ -170,11 +170,11 @@ def pictures():
 def texts():
     """Bombs in place of records and tables: how they are given, name and bytes."""
     yield 'rig', 'deep.json', b'[' * 5_000_000
-    yield 'rig', 'wide.json', b'[' + b'{},' * 4_000_000 + b'{}]'
-    yield 'rig', 'keys.json', b'{' + b','.join(b'"%d":0' % i for i in range(1_200_000)) + b'}'
+    yield 'rig', 'wide.json', b'[' + b'{},' * 2_790_000 + b'{}]'
+    yield 'rig', 'keys.json', b'{' + b','.join(b'"%d":0' % i for i in range(700_000)) + b'}'
     yield 'rig', 'long.json', b'{"schema":"' + b'a' * 50_000_000 + b'"}'
     yield 'capture', 'many.lp', b'170000\n' + b'a.png 0 0 1\n' * 170_000
-    yield 'rig', 'numbers.json', b'[' + b'0,' * 8_000_000 + b'0]'
+    yield 'rig', 'numbers.json', b'[' + b'0,' * 4_190_000 + b'0]'
     yield 'capture', 'lines.lp', b'1\n' * 1_000_000
     yield 'capture', 'says-many.lp', b'1000000000\na.png 0 0 1\n'
     yield 'mask', 'mask.png', png(20000, 20000, 8, 0, zeros(20001 * 20000))

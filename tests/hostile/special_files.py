@@ -241,9 +241,9 @@ def try_session(trial, work):
             trial.run(f'{" ".join(str(word) for word in words[:2])}, {name} of the session',
                       trial.in_session(name),
                       lambda path, w=words, d=depth: [*w, path.parents[d - 1]],
-                      # A mask that is no file is none, and a link to nothing is no file.
+                      # A mask that is no file is none, and a link to nothing is no truth.
                       lambda kind, n=name: n == 'mask.png' or
-                      (kind == 'dangling' and n.startswith('truth')))
+                      (kind in ('dangling', 'loop') and n.startswith('truth')))
 
 
 def main():
