@@ -188,12 +188,13 @@ Result<Decoded> DecodeOpened(const std::filesystem::path& path, OIIO::ImageInput
 }
 
 // A file whose header is read and allowed.
-struct Opened {
+struct OpenedPhoto {
   InputFile file;  // as long as `input` reads it
   std::unique_ptr<OIIO::ImageInput> input;
 };
 
-Result<Opened> OpenUnguarded(const std::filesystem::path& path, const PictureLimit& limit) {
+Result<OpenedPhoto> OpenPhotoUnguarded(const std::filesystem::path& path,
+                                       const PictureLimit& limit) {
   Result<InputFile> file = InputFile::Open(path);
   if (!file) {
     return tl::unexpected(file.error());
@@ -212,7 +213,7 @@ Result<Opened> OpenUnguarded(const std::filesystem::path& path, const PictureLim
       return tl::unexpected(whole.error());
     }
   }
-  Opened opened{*std::move(file), OIIO::ImageInput::create(format)};
+  OpenedPhoto opened{*std::move(file), OIIO::ImageInput::create(format)};
   if (!opened.input) {
     return Fail(ErrorCode::kBadData, "{}: this OpenImageIO cannot read {} files: {}", path.string(),
                 format, OIIO::geterror());
@@ -234,9 +235,9 @@ Result<Opened> OpenUnguarded(const std::filesystem::path& path, const PictureLim
   return opened;
 }
 
-Result<Opened> Open(const std::filesystem::path& path, const PictureLimit& limit) {
+Result<OpenedPhoto> OpenPhoto(const std::filesystem::path& path, const PictureLimit& limit) {
   try {
-    return OpenUnguarded(path, limit);
+    return OpenPhotoUnguarded(path, limit);
   } catch (const std::bad_alloc&) {
     return Fail(ErrorCode::kOutOfMemory, "{}: out of memory while its header was read",
                 path.string());
@@ -247,7 +248,7 @@ Result<Opened> Open(const std::filesystem::path& path, const PictureLimit& limit
 
 Result<Decoded> Decode(const std::filesystem::path& path, Encoding encoding,
                        const PictureLimit& limit) {
-  Result<Opened> opened = Open(path, limit);
+  Result<OpenedPhoto> opened = OpenPhoto(path, limit);
   if (!opened) {
     return tl::unexpected(opened.error());
   }
@@ -279,7 +280,7 @@ Result<Photo> ReadPhoto(const std::filesystem::path& path, Encoding encoding,
 }
 
 Result<ImageSize> ReadPhotoSize(const std::filesystem::path& path, const PictureLimit& limit) {
-  return Open(path, limit).map([](const Opened& opened) {
+  return OpenPhoto(path, limit).map([](const OpenedPhoto& opened) {
     return ImageSize{opened.input->spec().width, opened.input->spec().height};
   });
 }

@@ -171,7 +171,7 @@ RawMosaic FractionsOf(const RawReadings& readings) {
 using TakeDecoded = std::function<Status(const RawReadings&, const libraw_data_t&)>;
 
 // A file whose header is read and allowed.
-struct Opened {
+struct OpenedRaw {
   InputFile file;               // as long as `raw` reads it
   std::unique_ptr<LibRaw> raw;  // too large for a stack
 
@@ -181,7 +181,7 @@ struct Opened {
 };
 
 // Both the visible area and all sites are checked: room is made for all.
-Status CheckLimit(const std::filesystem::path& path, const Opened& opened,
+Status CheckLimit(const std::filesystem::path& path, const OpenedRaw& opened,
                   const PictureLimit& limit) {
   const libraw_image_sizes_t& sizes = opened.raw->imgdata.sizes;
   return limit.Check(path, opened.Size(), opened.file.Bytes()).and_then([&] {
@@ -196,7 +196,7 @@ void ThrowIfNoMemory(int libraw_status) {
   }
 }
 
-Result<Opened> Open(const std::filesystem::path& path, const PictureLimit& limit) {
+Result<OpenedRaw> OpenRaw(const std::filesystem::path& path, const PictureLimit& limit) {
   Result<InputFile> file = InputFile::Open(path);
   if (!file) {
     return tl::unexpected(file.error());
@@ -210,7 +210,7 @@ Result<Opened> Open(const std::filesystem::path& path, const PictureLimit& limit
       return tl::unexpected(whole.error());
     }
   }
-  Opened opened{*std::move(file), std::make_unique<LibRaw>(LIBRAW_OPTIONS_NONE)};
+  OpenedRaw opened{*std::move(file), std::make_unique<LibRaw>(LIBRAW_OPTIONS_NONE)};
   opened.raw->set_dataerror_handler(nullptr, nullptr);  // it would print to stderr
   const int status = opened.raw->open_file(opened.file.LibraryName().c_str());
   ThrowIfNoMemory(status);
@@ -223,7 +223,7 @@ Result<Opened> Open(const std::filesystem::path& path, const PictureLimit& limit
   return opened;
 }
 
-Status Unpack(const std::filesystem::path& path, Opened& opened) {
+Status Unpack(const std::filesystem::path& path, OpenedRaw& opened) {
   const int status = opened.raw->unpack();
   ThrowIfNoMemory(status);
   return CheckDecoded(path, *opened.raw, status);
@@ -231,10 +231,10 @@ Status Unpack(const std::filesystem::path& path, Opened& opened) {
 
 // Calls `use` with the opened file, and turns what is thrown into errors.
 Status WithOpened(const std::filesystem::path& path, const PictureLimit& limit,
-                  const std::function<Status(Opened&)>& use) {
+                  const std::function<Status(OpenedRaw&)>& use) {
   ImageSize size_px;
   try {
-    return Open(path, limit).and_then([&](Opened opened) {
+    return OpenRaw(path, limit).and_then([&](OpenedRaw opened) {
       size_px = opened.Size();
       return use(opened);
     });
@@ -248,7 +248,7 @@ Status WithOpened(const std::filesystem::path& path, const PictureLimit& limit,
 
 Status Decode(const std::filesystem::path& path, const PictureLimit& limit,
               const TakeDecoded& take) {
-  return WithOpened(path, limit, [&](Opened& opened) {
+  return WithOpened(path, limit, [&](OpenedRaw& opened) {
     return Unpack(path, opened)
         .and_then([&] { return ReadingsOf(path, *opened.raw); })
         .and_then([&](const RawReadings& readings) { return take(readings, opened.raw->imgdata); });
@@ -307,7 +307,7 @@ Result<RawMosaic> ReadRawMosaic(const std::filesystem::path& path, const Picture
 Result<ImageSize> ReadRawSize(const std::filesystem::path& path, const PictureLimit& limit) {
   ImageSize size_px;
   return WithOpened(path, limit,
-                    [&](const Opened& opened) {
+                    [&](const OpenedRaw& opened) {
                       size_px = opened.Size();
                       return Status();
                     })

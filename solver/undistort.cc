@@ -59,7 +59,7 @@ std::array<double, 4> CubicWeights(double t) {
           t * (0.5 + t * (2.0 - 1.5 * t)), t * t * (0.5 * t - 0.5)};
 }
 
-double Cubic(const Image<float>& plane, const Place& place) {
+double CubicAt(const Image<float>& plane, const Place& place) {
   const std::array<double, 4> across = CubicWeights(place.u);
   const std::array<double, 4> down = CubicWeights(place.v);
   double sum = 0.0;
@@ -116,7 +116,7 @@ void Resample(const NormalField& field, const Place& place, int column, int row,
   }
   const bool cubic = AllSixteenSolved(field.reason, place);
   const auto read = [&](const Image<float>& plane) {
-    return cubic ? Cubic(plane, place) : Linear(plane, place);
+    return cubic ? CubicAt(plane, place) : Linear(plane, place);
   };
   const Eigen::Vector3d normal =
       Eigen::Vector3d(read(field.normal[0]), read(field.normal[1]), read(field.normal[2]))

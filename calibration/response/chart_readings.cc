@@ -133,8 +133,8 @@ std::vector<PatchSample> SamplesOf(const ChartReadings& readings, DarkLevel& dar
 
 double UnevennessOf(const PatchSites& sites, const std::vector<uint16_t>& dn, double black_dn) {
   constexpr uint8_t kGreen = 1;
-  constexpr size_t kAlong = kPatchBlocks;
-  constexpr size_t kParts = kAlong * kAlong;
+  constexpr size_t kBlocksAlong = kPatchBlocks;
+  constexpr size_t kParts = kBlocksAlong * kBlocksAlong;
   std::array<SiteMoments, kParts> parts;
   for (size_t i = 0; i < dn.size(); ++i) {
     if (sites.colour[i] == kGreen) {
@@ -145,8 +145,9 @@ double UnevennessOf(const PatchSites& sites, const std::vector<uint16_t>& dn, do
   Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
   Eigen::Vector3d right = Eigen::Vector3d::Zero();
   const auto place = [](size_t part) {
-    return Eigen::Vector3d(1.0, static_cast<double>(part % kAlong),
-                           std::floor(static_cast<double>(part) / static_cast<double>(kAlong)));
+    return Eigen::Vector3d(
+        1.0, static_cast<double>(part % kBlocksAlong),
+        std::floor(static_cast<double>(part) / static_cast<double>(kBlocksAlong)));
   };
   double mean = 0.0;
   double filled = 0.0;

@@ -102,7 +102,7 @@ std::string KindOfJob(const std::string& text) {
 }
 
 Result<PostedCapture> CaptureFromJson(const std::string& text, const CaptureOptions& defaults) {
-  const Result<nlohmann::json> parsed = ParseRequest(text);
+  const Result<nlohmann::json> parsed = ParseBody(text);
   if (!parsed) {
     return tl::unexpected(parsed.error());
   }
@@ -164,7 +164,7 @@ std::string CaptureToJson(const CaptureRequest& request, const std::string& clie
 }
 
 Result<PostedPreview> PreviewFromJson(const std::string& text) {
-  Result<nlohmann::json> parsed = ParseRequest(text);
+  Result<nlohmann::json> parsed = ParseBody(text);
   if (!parsed) {
     return tl::unexpected(parsed.error());
   }
@@ -219,7 +219,7 @@ std::string PreviewToJson(const PreviewRequest& request, const std::filesystem::
 }
 
 Result<PostedLight> LightFromJson(const std::string& text, int channel) {
-  const Result<nlohmann::json> parsed = ParseRequest(text);
+  const Result<nlohmann::json> parsed = ParseBody(text);
   if (!parsed) {
     return tl::unexpected(parsed.error());
   }
@@ -250,7 +250,7 @@ std::string LightToJson(const LightRequest& request, const std::string& client) 
 }
 
 Result<PostedBoardChange> BoardChangeFromJson(const std::string& text) {
-  const Result<nlohmann::json> parsed = ParseRequest(text);
+  const Result<nlohmann::json> parsed = ParseBody(text);
   if (!parsed) {
     return tl::unexpected(parsed.error());
   }

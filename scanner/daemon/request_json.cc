@@ -5,7 +5,7 @@
 
 namespace sateen {
 
-Result<nlohmann::json> ParseRequest(const std::string& text) {
+Result<nlohmann::json> ParseBody(const std::string& text) {
   Result<nlohmann::json> json = ParseJson(text.empty() ? "{}" : text, std::string(kRequest));
   if (!json) {
     return Fail(ErrorCode::kInvalidArgument, "{}", json.error().message);

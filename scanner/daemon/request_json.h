@@ -15,7 +15,7 @@ namespace sateen {
 inline constexpr std::string_view kRequest = "request";
 
 // Parses one JSON object; an empty body is an object without keys.
-[[nodiscard]] Result<nlohmann::json> ParseRequest(const std::string& text);
+[[nodiscard]] Result<nlohmann::json> ParseBody(const std::string& text);
 // Closes a reader: a fault of a request is a kInvalidArgument.
 [[nodiscard]] Status FinishRequest(JsonReader& json);
 

@@ -68,7 +68,7 @@ void ReadMethod(JsonReader& json, SolveOptions& options) {
 }  // namespace
 
 Result<PostedSolve> SolveFromJson(const std::string& text) {
-  const Result<nlohmann::json> parsed = ParseRequest(text);
+  const Result<nlohmann::json> parsed = ParseBody(text);
   if (!parsed) {
     return tl::unexpected(parsed.error());
   }

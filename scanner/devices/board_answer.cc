@@ -93,7 +93,7 @@ std::string NotDark(const SateenState& said) {
   return said.shutter_ms == 0 ? "" : "the shutter output is closed";
 }
 
-std::string Either(std::string first, const std::string& second) {
+std::string Either(const std::string& first, const std::string& second) {
   return first.empty() ? second : first;
 }
 

@@ -327,7 +327,7 @@ Result<BoardState> LightBoard::Limit(int channel, const LightLimits& limits) {
   if (!valid) {
     return tl::unexpected(valid.error());
   }
-  const Result<BoardState> answer =
+  Result<BoardState> answer =
       Do(SateenLimitLight{.channel = static_cast<std::uint8_t>(channel),
                           .max_level_permille = PermilleOf(limits.max_level),
                           .max_on_ms = static_cast<std::uint16_t>(limits.max_on.count())},
@@ -347,7 +347,7 @@ Result<BoardState> LightBoard::Configure(const BoardSettings& settings) {
                 "max_lit {} needs 1 to {}, and dim_clock {} needs 0 to 2", settings.max_lit,
                 channels, settings.dim_clock);
   }
-  const Result<BoardState> answer =
+  Result<BoardState> answer =
       Do(SateenConfigure{.max_lit = static_cast<std::uint8_t>(settings.max_lit),
                          .dim_clock = static_cast<std::uint8_t>(settings.dim_clock),
                          .sync_edge = static_cast<std::uint8_t>(settings.sync_rising)},

@@ -98,6 +98,7 @@ TEST(Program, NoNameReachesTheTerminalAsAnEscape) {
   const std::filesystem::path folder = temp.Path() / name;
   std::filesystem::create_directory(folder);
   const std::string path = folder.string();
+  const std::string rig = (folder / "rig.json").string();
   testing::WriteText(folder / "session.json", R"({"schema":"\u001b[31m\u009b/1"})");
   testing::WriteText(folder / "rig.json",
                      R"({"schema":"sateen.rig/1","lights":[{"name":"\u001b[2J\u009b1m"}]})");
@@ -108,8 +109,7 @@ TEST(Program, NoNameReachesTheTerminalAsAnEscape) {
            {"simulate", path.c_str(), "-o", "/nonexistent/session"},
            {"light", name.c_str(), "--level", name.c_str()},
            {"light", name.c_str(), "--port", path.c_str()},
-           {"light", name.c_str(), "--port", "/nonexistent", "--rig",
-            (folder / "rig.json").c_str()},
+           {"light", name.c_str(), "--port", "/nonexistent", "--rig", rig.c_str()},
            {name.c_str()}}) {
     const Outcome run = RunSateen(words);
     EXPECT_NE(run.exit_status, 0) << words[0];

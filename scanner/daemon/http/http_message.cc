@@ -187,7 +187,7 @@ Status HttpResponseParser::End() {
 }
 
 int HttpResponseParser::StatusCode() const {
-  return impl_->parser.is_header_done() ? impl_->parser.get().result_int() : 0;
+  return impl_->parser.is_header_done() ? static_cast<int>(impl_->parser.get().result_int()) : 0;
 }
 
 std::string HttpResponseParser::TakeBody() {
