@@ -71,7 +71,7 @@ int RunHostile() {
   return good ? 0 : 3;
 }
 
-// What it uses after a tenth of the sessions, and at least five, and at the end.
+// Compares the daemon's use after a tenth of the sessions, at least five, with that at the end.
 int RunDay(int sessions) {
   StressedDaemon daemon({});
   DaemonDay day(daemon);

@@ -103,7 +103,7 @@ class TiffWalk {
   // Tiles that the directories do not list.
   [[nodiscard]] uint64_t MissingTiles() const { return missing_tiles_; }
 
-  // Whether there was more than is walked.
+  // Returns true if there was more than is walked.
   [[nodiscard]] bool Overflows() const { return entries_ > kMaxEntries || values_ > kMaxValues; }
 
   // Over all directories. Cameras write some hundred entries, and a value per strip or tile.

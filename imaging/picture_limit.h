@@ -15,7 +15,7 @@ namespace sateen {
 ///
 ///     max(kSmallPixels, kPixelsPerByte x bytes of the file), at most kMaxPixels                 (1)
 ///
-/// pixels. A photograph has about one pixel per byte, a JPEG of the poorest quality some thirty.
+/// pixels. A photograph has about one pixel per byte; only flat pictures have more than 64.
 struct PictureLimit {
   static constexpr int64_t kSmallPixels = 24'000'000;
   static constexpr int64_t kPixelsPerByte = 64;

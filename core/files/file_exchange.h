@@ -32,7 +32,7 @@ struct FileExchange {
                            bool& keeps_former) const;
 };
 
-// What became of an exchange in which the process was killed, or which the disk did not let end.
+// Outcome of an exchange that was cut short: the process was killed, or the disk failed.
 struct ExchangeUndone {
   std::size_t back = 0;                     // former files that are in their places again
   std::vector<std::filesystem::path> kept;  // former files whose places are taken, in `staging`

@@ -41,7 +41,7 @@ bool HasOwnName(const std::string& name, std::string_view prefix) {
 
 enum class Left { kNothingOfOurs, kAlive, kAbandoned, kOfAnotherUser, kWithoutLocks };
 
-// What a later run finds of a folder that has such a name.
+// State of a folder that has such a name, as a later run finds it.
 struct Found {
   Left left = Left::kNothingOfOurs;
   int mark = -1;  // descriptor, of a folder of this user

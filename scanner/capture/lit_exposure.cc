@@ -53,7 +53,7 @@ class KeepAlive {
     while (!stop_.wait_for(lock, kStep, [&] { return stopped_; })) {
       silent += kStep;
       if (task_.Cancelled()) {
-        // What it says to that is asked again when the camera has ended.
+        // The board's answer is asked for again when the camera has ended.
         [[maybe_unused]] const Result<BoardState> ignored = board_.AllOff();
         return;
       }

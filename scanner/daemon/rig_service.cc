@@ -335,7 +335,7 @@ RigService::Impl::LightsWord RigService::Impl::ConfirmLightsOff() {
     return lights;
   }
   {
-    // Who waits for the lights to be off is told now, and not when the port has been waited for.
+    // Tells those that wait for the lights now, before the port is waited for.
     const std::lock_guard lock(mutex_);
     lights_fault_ = lights.fault;
     board_lost_ = !lights.contradicts;

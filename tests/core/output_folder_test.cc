@@ -299,7 +299,7 @@ class KilledInCommitTest : public OutputFolderTest {
     ASSERT_TRUE(folder.Commit());
     testing::WriteText(dir_ / "notes.txt", "mine");
   }
-  // Whether the second run was killed at that rename.
+  // Returns true if the second run was killed at that rename.
   bool KillSecondRunAt(int rename) const {
     const pid_t child = fork();
     if (child == 0) {

@@ -4,7 +4,8 @@
     bombs.py PROGRAM [NAME] [--verbose]
 
 Each must be refused (exit status 2 to 5, with words) within 1 s and 300 MB; the address space has
-2 GB. The processor's seconds count, so that a busy machine fails no one.
+2 GB. The processor's seconds count, so that a busy machine fails no one. Frames that are right and
+find no room must be called out of memory (status 1).
 """
 
 import os

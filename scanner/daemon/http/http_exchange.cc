@@ -111,7 +111,7 @@ ApiResponse HttpExchange::Answer(const HttpRequest& request) {
       return *std::move(refused);
     }
   }
-  // What turns the lights off does not wait for a body.
+  // Turning the lights off does not wait for a body.
   tl::expected<std::string, ApiResponse> body =
       IsLightsOff(request.method, request.path) ? std::string() : ReadBody(request);
   if (!body) {

@@ -21,7 +21,7 @@ constexpr milliseconds kToAsk{500};
 constexpr milliseconds kToLeave{500};
 constexpr std::size_t kMaxGuests = 128;
 constexpr std::size_t kMaxUrgent = 64;
-constexpr std::size_t kMaxHeadHere = 16'384;     // bytes
+constexpr std::size_t kMaxWaitingHead = 16'384;  // bytes
 constexpr std::size_t kMaxRead = 1'048'576;      // bytes of one guest
 constexpr std::size_t kMaxReadAtOnce = 262'144;  // bytes, before the next guest's turn
 
@@ -124,7 +124,7 @@ bool WaitingRoom::TakeBytes(Guest& guest, std::string_view bytes) {
     urgent_.push_back({.fd = std::exchange(guest.fd, -1), .begun = std::move(guest.begun)});
     return false;
   }
-  if (head || guest.begun.size() >= kMaxHeadHere) {
+  if (head || guest.begun.size() >= kMaxWaitingHead) {
     Refuse(guest);
   }
   return true;

@@ -182,7 +182,7 @@ TEST_F(HttpServerTest, RequestsThatEndTooEarlyAre400) {
   EXPECT_EQ(StatusOf(whole.Read()), 200);
 }
 
-// What turns the lights off is not kept waiting for a body that it does not need.
+// Turning the lights off does not wait for a body that it does not need.
 TEST_F(HttpServerTest, LightsOffNeedsNoBody) {
   ServeUnix({.client_time = testing::kLong});
   RawClient client(Socket());
